@@ -1,0 +1,13 @@
+"""Array types used in signatures.
+
+Shapes are written with jaxtyping (``Float[Array, "n 3"]``); they are checked while the tests run
+and cost nothing otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+Array: TypeAlias = np.ndarray[Any, Any]
