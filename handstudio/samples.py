@@ -68,6 +68,7 @@ class Gap:
 
     why: Why
     missing: int  # instants known to be missing; 0 where nobody knows
+    elapsed_us: int = 0  # host time from the last instant before to the first after a restart
 
 
 Event: TypeAlias = ImuSamples | Gap
@@ -90,8 +91,11 @@ class Ranges(msgspec.Struct, frozen=True):
         )
 
 
-def from_packets(packets: Iterable[Packet], ranges: Ranges) -> list[Event]:
-    """Turn packets into events; whatever is not motion (replies, health, damage) is left out."""
+def from_packets(packets: Iterable[Packet], ranges: Ranges, away_us: int = 0) -> list[Event]:
+    """Turn packets into events; whatever is not motion (replies, health, damage) is left out.
+
+    ``away_us`` is the host time since the last instant, should the device have restarted.
+    """
     events: list[Event] = []
     run: list[ImuPacket] = []
     for packet in packets:
@@ -103,7 +107,7 @@ def from_packets(packets: Iterable[Packet], ranges: Ranges) -> list[Event]:
                 events.append(Gap(Why.LOST, count))
             case Restart():
                 _close(run, ranges, events)
-                events.append(Gap(Why.RESTART, 0))
+                events.append(Gap(Why.RESTART, 0, away_us))
             case _:
                 pass
     _close(run, ranges, events)

@@ -1,0 +1,72 @@
+"""What every filter promises.
+
+A filter is frozen parameters; its state is a value that goes in and comes out. The order of the
+sensors is the layout's. Orientations are ``q_world_sensor``: z up, x along the horizontal
+magnetic field.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeVar
+
+from jaxtyping import Bool, Float
+
+from handstudio.arrays import Array
+from handstudio.samples import ImuSamples
+
+State = TypeVar("State")
+
+
+class Filter(Protocol[State]):
+    """A fusion filter over all sensors of a layout."""
+
+    def begin(self, sensors: int, rate_hz: float) -> State:
+        """State before the first sample: attitude from whatever the first sample says."""
+        ...
+
+    def restart(self, state: State) -> State:
+        """Forget all attitudes (the device was away for long), keep what is known of sensors."""
+        ...
+
+    def place(
+        self,
+        state: State,
+        sensor: int,
+        q_world_sensor: Float[Array, " 4"],
+        gyr_bias: Float[Array, " 3"],
+    ) -> State:
+        """Set a sensor's attitude and gyroscope bias [rad/s], as found at rest."""
+        ...
+
+    def run(
+        self,
+        state: State,
+        samples: ImuSamples,
+        stretch: Float[Array, " n"],
+        heeded: Bool[Array, "n s"],
+    ) -> tuple[Float[Array, "n s 4"], State]:
+        """Fuse consecutive samples.
+
+        Args:
+            state: Where the last run ended.
+            samples: No instant missing between them.
+            stretch: Length of the step that leads to each sample, in nominal sample periods.
+            heeded: Where a sensor's reading is used; elsewhere its orientation is held.
+
+        Returns:
+            Orientation after each sample, and the state to go on from. Cutting ``samples``
+            anywhere changes no digit.
+        """
+        ...
+
+    def pack(self, state: State) -> bytes:
+        """Serialise a state, to the last bit."""
+        ...
+
+    def unpack(self, packed: bytes) -> State:
+        """Inverse of `pack`.
+
+        Raises:
+            SetupError: these bytes are not a state of this filter.
+        """
+        ...

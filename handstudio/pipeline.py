@@ -1,0 +1,334 @@
+"""The pipeline: events in, motion out. Live, replay and batch run this same code.
+
+The state is one value. Cutting the events anywhere, or saving and resuming the state, changes no
+digit of the motion. The only clock is the device's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import IntFlag
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Bool, Float, Int64, UInt8
+
+from handstudio.arrays import Array
+from handstudio.calibration.rest import REST_S, first_rest
+from handstudio.errors import SetupError
+from handstudio.maths import so3
+from handstudio.samples import Event, Gap, ImuSamples, Why
+from handstudio.setup import Setup
+
+BRIDGE_S = 0.25
+"""Longest gap that is bridged by interpolation; after a longer one attitudes begin anew."""
+
+_JUMP = 1.5  # sample periods: a longer step means that instants are missing
+
+
+class Doubt(IntFlag):
+    """Why an orientation should not be taken at face value."""
+
+    UNPLACED = 1  # not yet initialised at rest (start, or after a long gap)
+    AFTER_GAP = 2  # the first instant after missing ones
+    SATURATED = 4
+    SILENT = 8  # the sensor did not answer: its orientation is held
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What comes out: orientations of all sensors with a time axis and doubts."""
+
+    time_us: Int64[Array, " n"]  # device time, continued over restarts of the device
+    q_world_sensor: Float[Array, "n s 4"]
+    q_world_start: Float[Array, "n 4"]  # first placed attitude of sensor 0; NaN before
+    doubt: UInt8[Array, "n s"]
+
+    def __len__(self) -> int:
+        return len(self.time_us)
+
+    def __getitem__(self, part: slice) -> Motion:
+        return Motion(
+            self.time_us[part],
+            self.q_world_sensor[part],
+            self.q_world_start[part],
+            self.doubt[part],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """Everything the pipeline remembers between events."""
+
+    filter: Any
+    placed: Bool[Array, " s"]
+    q_world_start: Float[Array, " 4"]
+    recent: ImuSamples  # a window of samples, while a sensor still waits for its rest
+    last: ImuSamples  # the newest sample, or none
+    clock_offset_us: int  # what continues the time axis over restarts of the device
+    resume_at_us: int | None  # after a restart: where on the time axis its first sample belongs
+
+
+def begin(setup: Setup) -> State:
+    """State before the first event."""
+    sensors = len(setup.layout.sensors)
+    return State(
+        filter=setup.filter.begin(sensors, setup.rate_hz),
+        placed=np.zeros(sensors, dtype=bool),
+        q_world_start=np.full(4, np.nan),
+        recent=_nothing(sensors),
+        last=_nothing(sensors),
+        clock_offset_us=0,
+        resume_at_us=None,
+    )
+
+
+def run(setup: Setup, state: State, events: Iterable[Event]) -> tuple[Motion, State]:
+    """Turn events into motion.
+
+    Returns:
+        The motion of these events, one instant a sample, and the state to go on from.
+    """
+    motions = [empty(len(setup.layout.sensors))]
+    for event in events:
+        match event:
+            case Gap(why=Why.RESTART, elapsed_us=elapsed):
+                state = _after_restart(setup, state, elapsed)
+            case Gap():
+                pass  # the step in the clock tells the same, and how long it was
+            case ImuSamples():
+                state = _run_samples(setup, state, event, motions)
+    return join(motions), state
+
+
+def empty(sensors: int) -> Motion:
+    """A motion of no instants."""
+    return Motion(
+        np.empty(0, dtype=np.int64),
+        np.empty((0, sensors, 4)),
+        np.empty((0, 4)),
+        np.empty((0, sensors), dtype=np.uint8),
+    )
+
+
+def join(motions: list[Motion]) -> Motion:
+    """One motion after the other."""
+    if len(motions) == 1:
+        return motions[0]
+    return Motion(*(np.concatenate([getattr(m, name) for m in motions]) for name in _FIELDS))
+
+
+_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
+
+
+def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[Motion]) -> State:
+    if state.resume_at_us is not None:
+        offset = state.resume_at_us - int(samples.time_us[0])
+        state = replace(state, clock_offset_us=offset, resume_at_us=None)
+    samples = replace(samples, time_us=samples.time_us + state.clock_offset_us)
+    times = np.concatenate([state.last.time_us, samples.time_us])
+    stretch = np.diff(times) * (setup.rate_hz * 1e-6)
+    if len(state.last) == 0:
+        stretch = np.concatenate([[1.0], stretch])
+    cuts = [0, *(int(i) for i in np.flatnonzero(stretch > _JUMP) if i > 0), len(samples)]
+    for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+        if end == start:
+            continue
+        part = samples[start:end]
+        if stretch[start] > _JUMP:
+            state = _over_gap(setup, state, part, stretch[start])
+            stretch[start] = 1.0
+            flag = Doubt.AFTER_GAP
+        else:
+            flag = Doubt(0)
+        first = len(motions)
+        state = _run_unbroken(setup, state, part, stretch[start:end], motions)
+        motions[first].doubt[0] |= np.uint8(flag)
+    return state
+
+
+def _run_unbroken(
+    setup: Setup, state: State, samples: ImuSamples, stretch: Array, motions: list[Motion]
+) -> State:
+    """Fuse samples without a gap, placing each sensor at its first rest."""
+    if state.placed.all():
+        return _fuse(setup, state, samples, stretch, motions)
+    window = max(2, round(REST_S * setup.rate_hz))
+    known = len(state.recent)
+    recent = _concatenate(state.recent, samples)
+    rests = {
+        int(sensor): found
+        for sensor in np.flatnonzero(~state.placed)
+        if (found := first_rest(recent, int(sensor), window, known)) is not None
+    }
+    done = 0
+    for end in sorted({end for end, _ in rests.values()}):
+        here = end - known
+        part = slice(done, here)
+        state = _fuse(setup, state, samples[part], stretch[part], motions)
+        for sensor, (at, rest) in rests.items():
+            if at == end:
+                state = _place(setup, state, sensor, rest.q_world_sensor, rest.gyr_bias)
+        done = here
+    state = _fuse(setup, state, samples[done:], stretch[done:], motions)
+    return replace(state, recent=recent[max(0, len(recent) - window + 1) :])
+
+
+def _place(setup: Setup, state: State, sensor: int, attitude: Array, bias: Array) -> State:
+    placed = state.placed.copy()
+    placed[sensor] = True
+    start = state.q_world_start
+    if sensor == 0 and not np.isfinite(start).all():
+        start = attitude
+    fused = setup.filter.place(state.filter, sensor, attitude, bias)
+    return replace(state, filter=fused, placed=placed, q_world_start=start)
+
+
+def _fuse(
+    setup: Setup, state: State, samples: ImuSamples, stretch: Array, motions: list[Motion]
+) -> State:
+    if len(samples) == 0:
+        return state
+    orientation, fused = setup.filter.run(state.filter, samples, stretch, samples.valid)
+    doubt = (
+        np.where(state.placed, 0, Doubt.UNPLACED)
+        | np.where(samples.saturated, Doubt.SATURATED, 0)
+        | np.where(samples.valid, 0, Doubt.SILENT)
+    ).astype(np.uint8)
+    start = np.tile(state.q_world_start, (len(samples), 1))
+    motions.append(Motion(samples.time_us, orientation, start, doubt))
+    return replace(state, filter=fused, last=samples[-1:])
+
+
+def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> State:
+    """Carry the filter over missing instants, or begin anew where they are too many."""
+    if periods > BRIDGE_S * setup.rate_hz:
+        return _unplaced(state, setup.filter.restart(state.filter))
+    missing = round(periods) - 1
+    if missing < 1:
+        return state
+    share = (np.arange(1, missing + 1) / (missing + 1))[:, None, None]
+    first, last = after[:1], state.last
+    bridge = ImuSamples(
+        time_us=np.full(missing, last.time_us[0]),
+        gyr=(1 - share) * last.gyr + share * first.gyr,
+        acc=(1 - share) * last.acc + share * first.acc,
+        mag=np.repeat(last.mag, missing, axis=0),
+        fresh=np.zeros((missing, last.gyr.shape[1]), dtype=bool),
+        valid=np.repeat(last.valid & first.valid, missing, axis=0),
+        saturated=np.zeros((missing, last.gyr.shape[1]), dtype=bool),
+    )
+    stretch = np.full(missing, periods / (missing + 1))
+    _, fused = setup.filter.run(state.filter, bridge, stretch, bridge.valid)
+    # a rest may not reach over a gap: nobody knows what happened in it
+    return replace(state, filter=fused, recent=_nothing(len(state.placed)))
+
+
+def _after_restart(setup: Setup, state: State, elapsed_us: int) -> State:
+    newest = state.last.time_us
+    state = _unplaced(state, setup.filter.restart(state.filter))
+    if len(newest) == 0:
+        return state
+    # the new epoch has a clock of its own; only the host knows how long the device was away
+    resume_at = int(newest[0]) + max(elapsed_us, round(1e6 / setup.rate_hz))
+    return replace(state, last=_nothing(len(state.placed)), resume_at_us=resume_at)
+
+
+def _unplaced(state: State, fused: object) -> State:
+    sensors = len(state.placed)
+    return replace(
+        state, filter=fused, placed=np.zeros(sensors, dtype=bool), recent=_nothing(sensors)
+    )
+
+
+def _nothing(sensors: int) -> ImuSamples:
+    vectors = np.empty((0, sensors, 3))
+    flags = np.empty((0, sensors), dtype=bool)
+    return ImuSamples(
+        np.empty(0, dtype=np.int64), vectors, vectors, vectors, flags, flags, flags
+    )
+
+
+def _concatenate(a: ImuSamples, b: ImuSamples) -> ImuSamples:
+    return ImuSamples(
+        *(np.concatenate([getattr(a, name), getattr(b, name)]) for name in ImuSamples.__slots__)
+    )
+
+
+# --- saving and resuming ------------------------------------------------------------------------
+
+
+class _PackedSamples(msgspec.Struct):
+    arrays: dict[str, bytes]
+    count: int
+    sensors: int
+
+
+class _Packed(msgspec.Struct):
+    version: int
+    filter: bytes
+    placed: list[bool]
+    q_world_start: list[float]
+    recent: _PackedSamples
+    last: _PackedSamples
+    clock_offset_us: int
+    resume_at_us: int | None
+
+
+def pack(setup: Setup, state: State) -> bytes:
+    """Serialise a state, to the last bit."""
+    return msgspec.msgpack.encode(
+        _Packed(
+            1,
+            setup.filter.pack(state.filter),
+            state.placed.tolist(),
+            state.q_world_start.tolist(),
+            _pack_samples(state.recent),
+            _pack_samples(state.last),
+            state.clock_offset_us,
+            state.resume_at_us,
+        )
+    )
+
+
+def unpack(setup: Setup, packed: bytes) -> State:
+    """Inverse of `pack`.
+
+    Raises:
+        SetupError: these bytes are not a state of this version's pipeline.
+    """
+    try:
+        got = msgspec.msgpack.decode(packed, type=_Packed)
+    except msgspec.MsgspecError as error:
+        raise SetupError(
+            f"The pipeline state stored with this recording cannot be read: {error}.",
+            "Process the take from its start instead: handstudio process --from-start.",
+        ) from error
+    return State(
+        setup.filter.unpack(got.filter),
+        np.array(got.placed, dtype=bool),
+        np.array(got.q_world_start),
+        _unpack_samples(got.recent),
+        _unpack_samples(got.last),
+        got.clock_offset_us,
+        got.resume_at_us,
+    )
+
+
+def _pack_samples(samples: ImuSamples) -> _PackedSamples:
+    arrays = {name: getattr(samples, name).tobytes() for name in ImuSamples.__slots__}
+    return _PackedSamples(arrays, len(samples), samples.gyr.shape[1])
+
+
+def _unpack_samples(packed: _PackedSamples) -> ImuSamples:
+    like = _nothing(packed.sensors)
+    return ImuSamples(
+        *(
+            np.frombuffer(packed.arrays[name], dtype=getattr(like, name).dtype).reshape(
+                packed.count, *getattr(like, name).shape[1:]
+            )
+            for name in ImuSamples.__slots__
+        )
+    )

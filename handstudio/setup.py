@@ -1,0 +1,126 @@
+"""The setup: everything that decides the output besides the events. Saved with every take."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TypeAlias
+
+import msgspec
+
+from handstudio.errors import SetupError
+from handstudio.fusion.vqf_filter import VqfFilter
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.layout import Layout, glove
+from handstudio.protocol.packets import Description, sensor_name
+from handstudio.samples import Ranges
+
+AnyFilter: TypeAlias = VqfFilter
+"""The filters a setup can name; each is a struct with a tag of its own."""
+
+FILTERS: dict[str, AnyFilter] = {"vqf": VqfFilter()}
+
+
+class Device(msgspec.Struct, frozen=True):
+    """What a take knows of the device it came from."""
+
+    name: str
+    serial_number: str
+    firmware: str
+    protocol: int
+
+
+class HandModel(msgspec.Struct, frozen=True):
+    """The hand that is shown: type 3 (two palm blocks) of mean proportions, by its length."""
+
+    hand_type: int = 3
+    hand_length_m: float = ADULT_HAND_LENGTH_M
+
+
+class Setup(msgspec.Struct, frozen=True):
+    """Everything that decides the output besides the events.
+
+    Attributes:
+        layout: Sensors and joints.
+        rate_hz: Nominal sampling rate.
+        ranges: What the device's counts stand for; None for imports, which are in SI.
+        decoder: Name of the decoder of the recorded bytes; None for imports.
+        filter: Which filter, with its parameters.
+        hand: The hand model.
+        device: Where the data came from.
+        zero: What joint angles are measured from.
+        calibration: Identity of the subject calibration in use.
+    """
+
+    layout: Layout
+    rate_hz: float
+    ranges: Ranges | None = None
+    decoder: str | None = None
+    filter: AnyFilter = VqfFilter()
+    hand: HandModel = HandModel()
+    device: Device | None = None
+    zero: str = "nominal mounting: sensor axes taken as segment axes"
+    calibration: str = "none (mean adult proportions scaled by hand length)"
+
+    @property
+    def key(self) -> str:
+        """Short hash of the whole setup."""
+        return hashlib.sha256(encode(self)).hexdigest()[:16]
+
+
+def for_device(
+    description: Description, decoder: str, hand: HandModel | None = None, side: str | None = None
+) -> Setup:
+    """The setup of a device that described itself, everything else at its default.
+
+    Args:
+        description: What the device says.
+        decoder: The decoder that understood it.
+        hand: The wearer's hand; mean adult unless given.
+        side: Which hand, where the device does not know.
+    """
+    names = tuple(sensor_name(number) for number in description.sensors)
+    known = side if description.side == "unknown" and side else description.side
+    return Setup(
+        layout=glove(known, names),
+        rate_hz=float(description.rate_hz),
+        ranges=Ranges.of(description),
+        decoder=decoder,
+        hand=hand or HandModel(),
+        device=Device(
+            description.name,
+            description.serial_number,
+            description.firmware,
+            description.protocol,
+        ),
+    )
+
+
+def filter_named(name: str) -> AnyFilter:
+    """A filter with its default parameters.
+
+    Raises:
+        SetupError: there is none of this name.
+    """
+    if name not in FILTERS:
+        raise SetupError(f"There is no filter {name!r}.", f"Choose one of: {', '.join(FILTERS)}.")
+    return FILTERS[name]
+
+
+def encode(setup: Setup) -> bytes:
+    """JSON, with the same bytes for equal setups."""
+    return msgspec.json.encode(setup, order="deterministic")
+
+
+def decode(data: bytes) -> Setup:
+    """Inverse of `encode`.
+
+    Raises:
+        SetupError: these bytes are not a setup this version understands.
+    """
+    try:
+        return msgspec.json.decode(data, type=Setup)
+    except msgspec.MsgspecError as error:
+        raise SetupError(
+            f"The setup stored with this recording cannot be read: {error}.",
+            "Open it with the version of handstudio that recorded it, or update handstudio.",
+        ) from error
