@@ -1,0 +1,53 @@
+"""What all tests share: shape checks, long and real tests, seeded hypotheses."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import hypothesis
+import jaxtyping
+import pytest
+
+# Must stand before anything imports handstudio. From here on every annotated call into it is
+# checked; a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@njit``.
+jaxtyping.install_import_hook("handstudio", "beartype.beartype")
+
+DATA_VARIABLE = "HANDSTUDIO_DATA"
+
+# The same examples everywhere and every time: a failure in CI is a failure at the desk.
+hypothesis.settings.register_profile(
+    "ci",
+    derandomize=True,
+    deadline=None,  # a busy machine is no bug
+    max_examples=25 if os.environ.get("CI") == "true" else 100,
+)
+hypothesis.settings.load_profile("ci")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="also run the tests that take minutes")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.get_closest_marker("long") and not config.getoption("--long"):
+            item.add_marker(pytest.mark.skip(reason="takes minutes: run with --long"))
+        if item.get_closest_marker("real") and not os.environ.get(DATA_VARIABLE):
+            item.add_marker(pytest.mark.skip(reason=_no_data()))
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder of recordings of real sensors (they are not part of the project)."""
+    chosen = os.environ.get(DATA_VARIABLE)
+    if not chosen:
+        pytest.skip(_no_data())
+    folder = Path(chosen)
+    if not folder.is_dir():
+        pytest.fail(f"{DATA_VARIABLE} is {folder}, which is no folder. Correct or unset it.")
+    return folder
+
+
+def _no_data() -> str:
+    return f"needs recordings of real sensors: set {DATA_VARIABLE} to their folder"
