@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum, IntFlag
 from typing import Literal, TypeAlias
 
+import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from handstudio.arrays import Array
@@ -58,7 +59,7 @@ class Description:
 
 
 @dataclass(frozen=True, slots=True)
-class ImuPacket:
+class ImuPacket:  # noqa: PLW1641 - arrays have no hash
     """One instant of all sensors, in counts; sequence and clock are unwrapped."""
 
     epoch: int  # low byte of the device's epoch
@@ -69,13 +70,19 @@ class ImuPacket:
     fresh: Bool[Array, " s"]  # its magnetometer reading is new
     counts: Int16[Array, "s 9"]  # accelerometer, gyroscope, magnetometer; x y z each
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ImuPacket) and _equal(self, other)
+
 
 @dataclass(frozen=True, slots=True)
-class Temperature:
+class Temperature:  # noqa: PLW1641 - arrays have no hash
     """Temperature of every sensor, sent now and then; NaN where unknown."""
 
     clock_us: int
     celsius: Float[Array, " s"]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Temperature) and _equal(self, other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +140,7 @@ class Reason(Enum):
     FRAMING = "framing"  # not COBS
     CHECKSUM = "checksum"
     LENGTH = "length"  # shorter or longer than its kind of packet
+    CONTENT = "content"  # a value that its kind of packet, or this device, cannot have
     OVERLONG = "overlong"  # no end of frame within the largest frame
     UNKNOWN_TYPE = "unknown type"
     OUT_OF_ORDER = "out of order"  # an instant that is not later than the one before
@@ -140,7 +148,7 @@ class Reason(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Corruption:
-    """Bytes that are no packet."""
+    """Bytes that are no packet. ``size`` is what they took on the wire, their end included."""
 
     reason: Reason
     size: int
@@ -155,7 +163,11 @@ class Missing:
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """The device began anew: its clock and sequence start over."""
+    """The device began anew: its clock and sequence start over, and what came before is no guide.
+
+    Also said of a device that claims the same epoch but whose clock or sequence was found to
+    have jumped back for good.
+    """
 
     epoch: int  # low byte
 
@@ -178,3 +190,14 @@ Packet: TypeAlias = (
     | Restart
     | ForeignVersion
 )
+
+
+def _equal(a: ImuPacket | Temperature, b: ImuPacket | Temperature) -> bool:
+    """Equal field by field; arrays by value, NaN equal to NaN."""
+    return all(_same(getattr(a, name), getattr(b, name)) for name in a.__slots__)
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    return a == b
