@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import IntFlag
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -18,7 +19,6 @@ from jaxtyping import Bool, Float, Int64, UInt8
 from handstudio.arrays import Array
 from handstudio.calibration.rest import REST_S, first_rest
 from handstudio.errors import SetupError
-from handstudio.maths import so3
 from handstudio.samples import Event, Gap, ImuSamples, Why
 from handstudio.setup import Setup
 
@@ -133,7 +133,7 @@ def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[
     if len(state.last) == 0:
         stretch = np.concatenate([[1.0], stretch])
     cuts = [0, *(int(i) for i in np.flatnonzero(stretch > _JUMP) if i > 0), len(samples)]
-    for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+    for start, end in pairwise(cuts):
         if end == start:
             continue
         part = samples[start:end]
@@ -246,9 +246,7 @@ def _unplaced(state: State, fused: object) -> State:
 def _nothing(sensors: int) -> ImuSamples:
     vectors = np.empty((0, sensors, 3))
     flags = np.empty((0, sensors), dtype=bool)
-    return ImuSamples(
-        np.empty(0, dtype=np.int64), vectors, vectors, vectors, flags, flags, flags
-    )
+    return ImuSamples(np.empty(0, dtype=np.int64), vectors, vectors, vectors, flags, flags, flags)
 
 
 def _concatenate(a: ImuSamples, b: ImuSamples) -> ImuSamples:

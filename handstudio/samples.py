@@ -124,6 +124,7 @@ def _samples(run: Sequence[ImuPacket], ranges: Ranges) -> ImuSamples:
     counts = np.stack([p.counts for p in run])
     si = counts / FULL_SCALE
     inertial = counts[..., :6]
+    at_limit = (inertial <= -FULL_SCALE + 1) | (inertial >= FULL_SCALE - 1)
     return ImuSamples(
         time_us=np.array([p.clock_us for p in run], dtype=np.int64),
         acc=si[..., 0:3] * ranges.acc,
@@ -131,5 +132,5 @@ def _samples(run: Sequence[ImuPacket], ranges: Ranges) -> ImuSamples:
         mag=si[..., 6:9] * ranges.mag,
         fresh=np.stack([p.fresh for p in run]),
         valid=np.stack([p.answering for p in run]),
-        saturated=((inertial <= -FULL_SCALE + 1) | (inertial >= FULL_SCALE - 1)).any(axis=-1),
+        saturated=np.asarray(at_limit.any(axis=-1)),
     )

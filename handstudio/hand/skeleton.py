@@ -22,8 +22,8 @@ HandSide: TypeAlias = Literal["left", "right"]
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
-ADULT_HAND_LENGTH_M = 0.190
-"""Middle of the means of adult men and women, 193 and 181 mm, towards the men's (ANSUR II, 2012)."""
+ADULT_HAND_LENGTH_M = 0.187
+"""Midway between the means of adult men and women, 193 and 181 mm (ANSUR II, 2012)."""
 
 _FOREARM_PER_HAND = 0.146 / 0.108  # shares of body height, Drillis and Contini 1966
 

@@ -40,12 +40,14 @@ def rotate(q: Float[Array, "*#b 4"], v: Float[Array, "*#b 3"]) -> Float[Array, "
     """Rotate vectors: ``v_a = rotate(q_a_b, v_b)``."""
     u = q[..., 1:]
     t = 2.0 * np.cross(u, v)
-    return v + q[..., :1] * t + np.cross(u, t)
+    turned: Array = v + q[..., :1] * t + np.cross(u, t)
+    return turned
 
 
 def normalize(q: Float[Array, "*b 4"]) -> Float[Array, "*b 4"]:
     """Scale to unit length."""
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    unit: Array = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return unit
 
 
 def from_axis_angle(
@@ -70,7 +72,8 @@ def log(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3"]:
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., :1])
     scale = np.where(sine > 1e-12, angle / np.where(sine > 1e-12, sine, 1.0), 2.0)
-    return scale * q[..., 1:]
+    vector: Array = scale * q[..., 1:]
+    return vector
 
 
 def angle_between(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[Array, "*b"]:

@@ -1,0 +1,80 @@
+"""A take as a device: its bytes again, at the pace they came (for tests and demos)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from handstudio.device.sources import SourceLost
+from handstudio.errors import DeviceError
+from handstudio.protocol.codec import encode
+from handstudio.protocol.packets import TIP_SENSOR, Description
+from handstudio.recording.take import Take, open_take
+from handstudio.samples import STANDARD_GRAVITY
+
+
+class ReplaySource:
+    """Yields a device's description, then the recorded chunks."""
+
+    def __init__(self, path: Path) -> None:
+        take = open_take(path)
+        if take.header.kind != "wire" or take.header.setup.decoder != "handstudio-1":
+            raise DeviceError(
+                f"{path}: holds no bytes of a device that can be played back.",
+                "Open it in Review instead.",
+            )
+        self._chunks: Iterator[tuple[int, bytes]] = take.chunks()
+        self._next: tuple[int, bytes] | None = (0, encode(_description(take)))
+        self._shift_ns: int | None = None
+
+    def read(self, timeout_s: float) -> bytes:
+        """The next chunk when it is due."""
+        if self._next is None:
+            raise SourceLost("the take has ended")
+        due_ns, chunk = self._next
+        wait_s = 0.0 if self._shift_ns is None else (due_ns + self._shift_ns - _now()) * 1e-9
+        if wait_s > timeout_s:
+            time.sleep(timeout_s)
+            return b""
+        time.sleep(max(0.0, wait_s))
+        self._next = next(self._chunks, None)
+        if self._shift_ns is None and self._next is not None:
+            self._shift_ns = _now() - self._next[0]
+        return chunk
+
+    def write(self, data: bytes) -> None:
+        """A recording cannot be asked for anything."""
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+
+def _now() -> int:
+    return time.monotonic_ns()
+
+
+def _description(take: Take) -> Description:
+    setup = take.header.setup
+    device, ranges = setup.device, setup.ranges
+    if device is None or ranges is None:
+        raise DeviceError(f"{take.path}: does not say which device it is from.", "Choose another.")
+    numbers = [TIP_SENSOR if n == "Tip" else int(n.removeprefix("SN")) for n in setup.layout.names]
+    side = setup.layout.side
+    return Description(
+        protocol=device.protocol,
+        epoch=0,
+        name=device.name,
+        serial_number=device.serial_number,
+        firmware=device.firmware,
+        side=side if side in ("left", "right") else "unknown",  # type: ignore[arg-type]
+        sensors=tuple(numbers),
+        rate_hz=round(setup.rate_hz),
+        max_rate_hz=round(setup.rate_hz),
+        magnetometer_rate_hz=min(100, round(setup.rate_hz)),
+        accelerometer_range_g=ranges.acc / STANDARD_GRAVITY,
+        gyroscope_range_dps=float(np.rad2deg(ranges.gyr)),
+        magnetometer_range_ut=ranges.mag,
+    )

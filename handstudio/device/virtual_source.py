@@ -1,0 +1,97 @@
+"""A virtual glove of our own: a process started with the line and ended with it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+
+from handstudio.device.sources import ByteSource, SourceLost, TcpSource, open_source
+from handstudio.errors import DeviceError
+
+START_S = 20.0
+"""How long a virtual glove may take to start on a busy machine."""
+
+_OPTIONS = ("rate", "seed", "side", "hand-length", "name", "epoch")
+
+
+class VirtualSource:
+    """Starts a virtual glove and speaks with it through a pseudo-terminal, or TCP on Windows.
+
+    Args:
+        options: Any of rate, seed, side, hand-length, name, as the glove's command line takes
+            them; ``transport=tcp`` asks for TCP.
+    """
+
+    def __init__(self, options: dict[str, str]) -> None:
+        self._process = _start(options)
+        try:
+            self._line: ByteSource = open_source(_address(self._process))
+        except DeviceError:
+            self._end()
+            raise
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes that are there, waiting up to a time for the first."""
+        if self._process.poll() is not None and not isinstance(self._line, TcpSource):
+            raise SourceLost("the virtual glove's process ended")
+        return self._line.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._line.write(data)
+
+    def close(self) -> None:
+        """End the glove."""
+        self._line.close()
+        self._end()
+
+    def _end(self) -> None:
+        with contextlib.suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()  # the glove quits with its parent
+        try:
+            self._process.wait(timeout=2.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+
+def _start(options: dict[str, str]) -> subprocess.Popen[str]:
+    unknown = options.keys() - {*_OPTIONS, "transport"}
+    if unknown:
+        raise DeviceError(
+            f"A virtual glove has no option {', '.join(sorted(unknown))}.",
+            f"It has {', '.join(_OPTIONS)} and transport.",
+        )
+    tcp = options.get("transport") == "tcp" or sys.platform == "win32"
+    command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--quit-with-parent"]
+    command += ["--tcp", "0"] if tcp else ["--pty"]
+    for option in _OPTIONS:
+        if option in options:
+            command += [f"--{option}", options[option]]
+    return subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+    )
+
+
+def _address(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    watchdog = threading.Timer(START_S, process.kill)
+    watchdog.start()
+    try:
+        line = process.stdout.readline()
+    finally:
+        watchdog.cancel()
+    try:
+        address = json.loads(line)["address"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise DeviceError(
+            f"The virtual glove did not start (it said {line.strip()!r}).",
+            "Try again; its messages are in the terminal the studio runs in.",
+        ) from error
+    return str(address)

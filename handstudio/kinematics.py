@@ -1,0 +1,126 @@
+"""From the motion of sensors to the motion of a hand: memoryless, over any stretch of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from handstudio.arrays import Array
+from handstudio.calibration.mounting import nominal_mounting
+from handstudio.errors import LayoutError
+from handstudio.hand.angles import (
+    ROOT_ANGLES,
+    Angle,
+    hand_angles,
+    joint_angles,
+    joint_index,
+)
+from handstudio.hand.pose import Pose, posed
+from handstudio.hand.skeleton import PARENTS, SEGMENTS, HandSide, Skeleton, nominal_skeleton
+from handstudio.layout import Layout
+from handstudio.maths import so3
+from handstudio.pipeline import Motion
+from handstudio.setup import Setup
+
+
+def skeleton_of(setup: Setup) -> Skeleton:
+    """The skeleton a setup describes.
+
+    Raises:
+        LayoutError: the layout is not a hand's.
+    """
+    side: HandSide
+    match setup.layout.side:
+        case "left":
+            side = "left"
+        case "right":
+            side = "right"
+        case _:
+            raise LayoutError(
+                "There is no hand in this recording.",
+                setup.layout.missing_for_hand + " Export orientations instead.",
+            )
+    return nominal_skeleton(side, setup.hand.hand_length_m)
+
+
+def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Float[Array, "n k 4"]:
+    """Attitude of every segment: by its own sensor, else carried along by its parent at rest."""
+    skeleton = skeleton_of(setup)
+    drivers = setup.layout.drivers
+    q_sensor_segment = nominal_mounting(setup.layout)
+    out = np.empty((len(q_world_sensor), len(SEGMENTS), 4))
+    for index, name in enumerate(SEGMENTS):
+        if name in drivers:
+            sensor = drivers[name]
+            out[:, index] = so3.multiply(q_world_sensor[:, sensor], q_sensor_segment[sensor])
+        else:
+            out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
+    return out
+
+
+def pose_of(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Pose:
+    """The placed hand."""
+    return posed(skeleton_of(setup), segment_attitudes(setup, q_world_sensor))
+
+
+def measured_angles(layout: Layout) -> tuple[Angle, ...]:
+    """The angles between segments that both carry a sensor; root angles need only the forearm."""
+    drivers = layout.drivers
+
+    def measured(angle: Angle) -> bool:
+        child = joint_index(angle.joint)
+        parent = PARENTS[child]
+        return SEGMENTS[child] in drivers and (parent < 0 or SEGMENTS[parent] in drivers)
+
+    return tuple(angle for angle in hand_angles() if layout.is_hand and measured(angle))
+
+
+def angles_of(
+    setup: Setup, motion: Motion, angles: Sequence[Angle] | None = None
+) -> Float[Array, "n a"]:
+    """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start."""
+    attitudes = segment_attitudes(setup, motion.q_world_sensor)
+    wanted = measured_angles(setup.layout) if angles is None else angles
+    return joint_angles(skeleton_of(setup), attitudes, motion.q_world_start, wanted)
+
+
+def has_start(motion: Motion) -> bool:
+    """Whether angles relative to the start can be given anywhere in this motion."""
+    return bool(np.isfinite(motion.q_world_start).any())
+
+
+def exported_angles(setup: Setup, motion: Motion) -> tuple[Angle, ...]:
+    """The angles a file should hold: root angles only where the motion has a start."""
+    started = has_start(motion)
+    return tuple(
+        angle for angle in measured_angles(setup.layout) if started or angle.name not in ROOT_ANGLES
+    )
+
+
+def relative_rotations(
+    layout: Layout, q_world_sensor: Float[Array, "n s 4"]
+) -> dict[str, Float[Array, "n 4"]]:
+    """``q_parent_child`` between the sensors across each joint that has one on both sides."""
+    drivers = layout.drivers
+    return {
+        joint.name: so3.multiply(
+            so3.conjugate(q_world_sensor[:, drivers[joint.parent]]),
+            q_world_sensor[:, drivers[joint.child]],
+        )
+        for joint in layout.joints
+        if joint.parent in drivers and joint.child in drivers
+    }
+
+
+def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
+    """Whether a segment's attitude is in doubt; one without a sensor is as its parent."""
+    drivers = setup.layout.drivers
+    out = np.zeros((len(doubt), len(SEGMENTS)), dtype=bool)
+    for index, name in enumerate(SEGMENTS):
+        if name in drivers:
+            out[:, index] = doubt[:, drivers[name]] != 0
+        elif PARENTS[index] >= 0:
+            out[:, index] = out[:, PARENTS[index]]
+    return out

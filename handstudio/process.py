@@ -1,0 +1,216 @@
+"""A take and a setup make a motion, kept beside the take under the hash of both and the version.
+
+One function, so that a folder of takes is a loop or a pool of processes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import msgspec
+import numpy as np
+
+from handstudio import __version__, pipeline
+from handstudio.errors import SetupError, TakeError
+from handstudio.pipeline import Motion
+from handstudio.recording.take import Take
+from handstudio.samples import Event, ImuSamples
+from handstudio.setup import Setup
+
+Progress: TypeAlias = Callable[[float], None]
+"""Told the share that is done, 0 to 1."""
+
+_BATCH = 2048  # instants fused at a time: memory does not grow with the take
+
+_KINDS = {"time_us": "<i8", "q_world_sensor": "<f8", "q_world_start": "<f8", "doubt": "u1"}
+
+
+class _Meta(msgspec.Struct):
+    count: int
+    sensors: int
+    version: str
+
+
+def process(
+    take: Take,
+    setup: Setup | None = None,
+    *,
+    from_start: bool = False,
+    progress: Progress | None = None,
+) -> Motion:
+    """The motion of a take, memory-mapped; computed once, then found beside the take.
+
+    Args:
+        take: The recording.
+        setup: Another setup than the take's own, to compare.
+        from_start: Ignore what was known before the first byte.
+        progress: Told how far it is.
+
+    Raises:
+        TakeError: the take is damaged, or the disk does not take the result.
+        SetupError: the stored state does not fit this version.
+    """
+    chosen = setup or take.header.setup
+    _refuse_other_sensors(take, chosen)
+    from_start = from_start or chosen != take.header.setup
+    folder = motion_folder(take, chosen, from_start)
+    if not (folder / "meta.json").exists():
+        _compute(take, chosen, from_start, folder, progress or (lambda share: None))
+    return _open(folder)
+
+
+def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:
+    """Where the motion of a take under a setup is kept."""
+    parts = f"{take.sha256()} {setup.key} {__version__} {from_start}"
+    key = hashlib.sha256(parts.encode()).hexdigest()[:16]
+    return take.path.with_suffix(".motion") / key
+
+
+def _refuse_other_sensors(take: Take, setup: Setup) -> None:
+    if len(setup.layout.sensors) != len(take.header.setup.layout.sensors):
+        raise SetupError(
+            f"The setup has {len(setup.layout.sensors)} sensors, the take "
+            f"{len(take.header.setup.layout.sensors)}.",
+            "Choose a setup with the sensors of the take.",
+        )
+
+
+class MotionWriter:
+    """Puts a motion on disk piece by piece; it counts only once `finish` has given it its place.
+
+    Args:
+        beside: The take's path: the motion is kept in ``NAME.motion`` beside it.
+        sensors: How many sensors the motion has.
+    """
+
+    def __init__(self, beside: Path, sensors: int) -> None:
+        self._sensors = sensors
+        self._count = 0
+        home = beside.with_suffix(".motion")
+        home.mkdir(parents=True, exist_ok=True)
+        self._folder = Path(tempfile.mkdtemp(prefix="unfinished-", dir=home))
+        self._files = {name: (self._folder / name).open("wb") for name in _KINDS}
+
+    def append(self, motion: Motion) -> None:
+        """Add the next instants."""
+        for name, kind in _KINDS.items():
+            self._files[name].write(getattr(motion, name).astype(kind).tobytes())
+        self._count += len(motion)
+
+    def finish(self, folder: Path) -> None:
+        """Close and move to where `process` looks for it."""
+        self._close()
+        meta = _Meta(self._count, self._sensors, __version__)
+        (self._folder / "meta.json").write_bytes(msgspec.json.encode(meta))
+        if not folder.exists():  # somebody may have been faster: the same numbers
+            self._folder.rename(folder)
+        self.discard()
+
+    def discard(self) -> None:
+        """Leave nothing behind."""
+        self._close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _close(self) -> None:
+        for file in self._files.values():
+            file.close()
+
+
+def _compute(take: Take, setup: Setup, from_start: bool, folder: Path, progress: Progress) -> None:
+    try:
+        writer = MotionWriter(take.path, len(setup.layout.sensors))
+        try:
+            _fill(writer, take, setup, from_start, progress)
+            writer.finish(folder)
+        finally:
+            writer.discard()
+    except OSError as error:
+        raise TakeError(
+            f"{folder}: the motion cannot be kept ({error.strerror or error}).",
+            "Free some space or check the folder's permissions, then process the take again.",
+        ) from error
+
+
+def _fill(
+    writer: MotionWriter, take: Take, setup: Setup, from_start: bool, progress: Progress
+) -> None:
+    state = _first_state(take, setup, from_start)
+    whole = max(1, take.summary.bytes if take.summary else take.path.stat().st_size)
+    seen = 0
+    for batch in _batches(take.events(from_start)):
+        motion, state = pipeline.run(setup, state, batch)
+        writer.append(motion)
+        seen += sum(_size(event) for event in batch)
+        progress(min(1.0, seen / whole))
+    progress(1.0)
+
+
+def _size(event: Event) -> int:
+    # about what an instant takes in the file, wire or samples: progress need not be exact
+    return len(event) * 18 * event.gyr.shape[1] if isinstance(event, ImuSamples) else 0
+
+
+def _first_state(take: Take, setup: Setup, from_start: bool) -> pipeline.State:
+    if from_start or not take.first_state.pipeline:
+        return pipeline.begin(setup)
+    return pipeline.unpack(setup, take.first_state.pipeline)
+
+
+def _batches(events: Iterator[list[Event]]) -> Iterator[list[Event]]:
+    """Join short runs of samples: fusing costs less in long ones, and the digits are the same."""
+    batch: list[Event] = []
+    count = 0
+    for event in chain.from_iterable(events):
+        batch.append(event)
+        count += len(event) if isinstance(event, ImuSamples) else 0
+        if count >= _BATCH:
+            yield _joined(batch)
+            batch, count = [], 0
+    if batch:
+        yield _joined(batch)
+
+
+def _joined(batch: list[Event]) -> list[Event]:
+    out: list[Event] = []
+    run: list[ImuSamples] = []
+    for event in batch:
+        if isinstance(event, ImuSamples):
+            run.append(event)
+            continue
+        out += [_concatenated(run)] if run else []
+        out.append(event)
+        run = []
+    return out + ([_concatenated(run)] if run else [])
+
+
+def _concatenated(run: list[ImuSamples]) -> ImuSamples:
+    if len(run) == 1:
+        return run[0]
+    names = ImuSamples.__slots__
+    return ImuSamples(*(np.concatenate([getattr(part, name) for part in run]) for name in names))
+
+
+def _open(folder: Path) -> Motion:
+    meta = msgspec.json.decode((folder / "meta.json").read_bytes(), type=_Meta)
+    n, s = meta.count, meta.sensors
+    shapes: dict[str, tuple[int, ...]] = {
+        "time_us": (n,),
+        "q_world_sensor": (n, s, 4),
+        "q_world_start": (n, 4),
+        "doubt": (n, s),
+    }
+    arrays: dict[str, Any] = {
+        name: (
+            np.memmap(folder / name, dtype=kind, mode="r", shape=shapes[name])
+            if n
+            else np.empty(shapes[name], dtype=kind)
+        )
+        for name, kind in _KINDS.items()
+    }
+    return Motion(**arrays)

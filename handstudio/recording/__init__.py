@@ -1,0 +1,1 @@
+"""Takes on disk: writing, reading, recovering, importing, finding. Formats: README.md here."""

@@ -1,0 +1,82 @@
+"""What a take says of itself, in the first records of its file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from handstudio import __version__
+from handstudio.errors import TakeError
+from handstudio.setup import Setup
+
+PROFILE = "handstudio"
+HEADER_RECORD = "handstudio.take"
+SUMMARY_RECORD = "handstudio.summary"
+STATE_ATTACHMENT = "first_state"
+WIRE_TOPIC = "/wire"
+SAMPLES_TOPIC = "/samples"
+FORMAT = 1
+
+
+class Header(msgspec.Struct, frozen=True):
+    """Who, what and when.
+
+    Attributes:
+        name: The take's name, as its file's.
+        subject: Code of the person, no name needed.
+        start_utc_ns: Host time of the start, nanoseconds since 1970 UTC.
+        setup: Everything that decides the output besides the events.
+        kind: ``wire`` for bytes of a device, ``samples`` for imports.
+        source: Address of the device, or the imported folder's name.
+        software: Version of handstudio that recorded it.
+        format: Version of this layout of the file.
+    """
+
+    name: str
+    subject: str
+    start_utc_ns: int
+    setup: Setup
+    kind: Literal["wire", "samples"]
+    source: str
+    software: str = __version__
+    format: int = FORMAT
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """What was known when the recording ended; absent in a recovered take."""
+
+    chunks: int
+    bytes: int
+    duration_s: float
+    packets: int = 0
+    missing: int = 0
+    damaged: int = 0
+    clock_offset_ns: int | None = None  # host minus device clock, at the end
+    clock_drift_ppm: float | None = None
+
+
+def encode_header(header: Header) -> dict[str, str]:
+    """The metadata record of a header."""
+    return {"json": msgspec.json.encode(header).decode()}
+
+
+def decode_header(record: dict[str, str], place: str) -> Header:
+    """Inverse of `encode_header`; ``place`` names the file in errors.
+
+    Raises:
+        TakeError: the record is damaged or of another version.
+    """
+    try:
+        header = msgspec.json.decode(record["json"], type=Header)
+    except (KeyError, msgspec.MsgspecError) as error:
+        raise TakeError(
+            f"{place}: the header of the take cannot be read ({error}).",
+            "Open it with the version of handstudio that recorded it, or update handstudio.",
+        ) from error
+    if header.format > FORMAT:
+        raise TakeError(
+            f"{place}: a take of format {header.format}; this version reads up to {FORMAT}.",
+            "Update handstudio.",
+        )
+    return header

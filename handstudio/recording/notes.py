@@ -1,0 +1,58 @@
+"""Notes beside a take: labels and words added later. The take itself never changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from handstudio.errors import TakeError
+from handstudio.recording.atomic import BACKUP, write_atomically
+
+
+class Label(msgspec.Struct, frozen=True):
+    """A named stretch of time, seconds from the first instant of the take."""
+
+    start_s: float
+    end_s: float
+    label: str
+
+
+class Notes(msgspec.Struct, frozen=True):
+    """Everything a person added to a take."""
+
+    labels: tuple[Label, ...] = ()
+    text: str = ""
+
+
+def notes_path(take: Path) -> Path:
+    """Where the notes of a take live."""
+    return take.with_suffix(".notes.json")
+
+
+def load_notes(take: Path) -> Notes:
+    """The notes of a take; empty where there are none.
+
+    Raises:
+        TakeError: neither the file nor its backup can be read.
+    """
+    path = notes_path(take)
+    problem: Exception | None = None
+    for candidate in (path, path.with_name(path.name + BACKUP)):
+        try:
+            return msgspec.json.decode(candidate.read_bytes(), type=Notes)
+        except FileNotFoundError:
+            continue
+        except (OSError, msgspec.MsgspecError) as error:
+            problem = problem or error
+    if problem is None:
+        return Notes()
+    raise TakeError(
+        f"{path}: the notes cannot be read ({problem}).",
+        "Move the file away to go on without notes; the take itself is not touched.",
+    )
+
+
+def save_notes(take: Path, notes: Notes) -> None:
+    """Store notes beside a take."""
+    write_atomically(notes_path(take), msgspec.json.format(msgspec.json.encode(notes)))

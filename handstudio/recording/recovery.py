@@ -1,0 +1,76 @@
+"""Getting back what was saved of an interrupted or damaged recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.records import Attachment, McapRecord, Message, Metadata
+
+from handstudio.errors import TakeError
+from handstudio.recording.header import HEADER_RECORD, STATE_ATTACHMENT, Header, decode_header
+from handstudio.recording.take import DAMAGE, records_until_damage
+from handstudio.recording.writer import UNFINISHED, TakeWriter
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What came back."""
+
+    path: Path
+    chunks: int
+    bytes: int
+    duration_s: float
+
+
+def recover(path: Path) -> Recovered:
+    """Make a whole take of all that was flushed before a recording stopped.
+
+    The damaged file stays where it is; the new one stands beside it, named
+    ``NAME-recovered.mcap``.
+
+    Raises:
+        TakeError: nothing of a take can be read from this file, or the new one exists already.
+    """
+    target = path.with_name(f"{_stem(path)}-recovered.mcap")
+    records = _readable(path)
+    header, state = _beginning(records, path)
+    writer = TakeWriter(target, header, state)
+    first = last = None
+    for record in records:
+        if isinstance(record, Message):
+            writer.write(record.log_time, record.data)
+            first, last = first or record.log_time, record.log_time
+    writer.close()
+    duration = (last - first) * 1e-9 if first is not None and last is not None else 0.0
+    return Recovered(target, writer.chunks, writer.bytes, duration)
+
+
+def _readable(path: Path) -> Iterator[McapRecord]:
+    try:
+        with path.open("rb") as stream:
+            yield from records_until_damage(stream)
+    except DAMAGE:
+        return  # the end of what can be read is what recovery is for
+    except OSError as error:
+        raise TakeError(
+            f"{path}: cannot be opened ({error.strerror or error}).", "Check the path."
+        ) from error
+
+
+def _beginning(records: Iterator[McapRecord], path: Path) -> tuple[Header, bytes]:
+    header = None
+    for record in records:
+        if isinstance(record, Metadata) and record.name == HEADER_RECORD:
+            header = decode_header(record.metadata, str(path))
+        if isinstance(record, Attachment) and record.name == STATE_ATTACHMENT and header:
+            return header, record.data
+    raise TakeError(
+        f"{path}: holds nothing of a take that can be read.",
+        "If it was recorded elsewhere, copy it again: the copy may be cut short.",
+    )
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(UNFINISHED).removesuffix(".mcap")

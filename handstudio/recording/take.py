@@ -1,0 +1,202 @@
+"""Reading a take."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Message, Metadata
+from mcap.records import Header as McapHeader
+from mcap.stream_reader import StreamReader, breakup_chunk
+from zstandard import ZstdError
+
+from handstudio.errors import TakeError
+from handstudio.recording.header import (
+    HEADER_RECORD,
+    PROFILE,
+    STATE_ATTACHMENT,
+    SUMMARY_RECORD,
+    Header,
+    Summary,
+    decode_header,
+)
+from handstudio.recording.samples_message import decode_samples
+from handstudio.recording.writer import UNFINISHED
+from handstudio.samples import Event
+from handstudio.stream import EventStream
+
+RECORD_LIMIT = 1 << 28
+"""No record of ours is longer [bytes]; a length beyond it is damage, not a reason to wait."""
+
+DAMAGE = (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, MemoryError)
+"""What reading a damaged file may raise."""
+
+
+@dataclass(frozen=True, slots=True)
+class FirstState:
+    """What decoder and pipeline knew at the first byte; empty where the take has its own start."""
+
+    stream: bytes = b""
+    pipeline: bytes = b""
+
+
+class _PackedFirstState(msgspec.Struct):
+    stream: bytes
+    pipeline: bytes
+
+
+def pack_first_state(state: FirstState) -> bytes:
+    """The attachment that holds a first state."""
+    return msgspec.msgpack.encode(_PackedFirstState(state.stream, state.pipeline))
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """A closed recording; `open_take` makes one."""
+
+    path: Path
+    header: Header
+    first_state: FirstState
+    summary: Summary | None
+
+    def chunks(self) -> Iterator[tuple[int, bytes]]:
+        """Messages in order: host time of arrival [ns UTC] and data.
+
+        Raises:
+            TakeError: the file is damaged; all before the damage has been given.
+        """
+        for record in _records(self.path):
+            if isinstance(record, Message):
+                yield record.log_time, record.data
+
+    def events(self, from_start: bool = False) -> Iterator[list[Event]]:
+        """Events in the order they came, chunk by chunk; memory does not grow with length.
+
+        Args:
+            from_start: Decode as if nothing was known before the first byte.
+        """
+        if self.header.kind == "samples":
+            for _, data in self.chunks():
+                yield [decode_samples(data)]
+            return
+        stream = self._stream(from_start)
+        for arrival_ns, chunk in self.chunks():
+            yield stream.feed(chunk, arrival_ns)[1]
+
+    def sha256(self) -> str:
+        """Hash of the raw file."""
+        with self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+    def _stream(self, from_start: bool) -> EventStream:
+        setup = self.header.setup
+        if setup.decoder is None:
+            raise TakeError(
+                f"{self.path}: the take does not say which decoder its bytes need.",
+                "It was not written by handstudio; import it instead.",
+            )
+        if from_start or not self.first_state.stream:
+            return EventStream(setup.decoder, setup.ranges)
+        return EventStream.resumed(setup.decoder, setup.ranges, self.first_state.stream)
+
+
+def open_take(path: Path) -> Take:
+    """Open a take; its data is read when asked for.
+
+    Raises:
+        TakeError: there is no such file, it is no take, or its recording was interrupted.
+    """
+    if path.name.endswith(UNFINISHED):
+        raise TakeError(
+            f"{path}: this recording was interrupted.",
+            f"Get back what was saved: handstudio recover '{path}'.",
+        )
+    header, state = None, FirstState()
+    for record in _records(path):
+        match record:
+            case Metadata(name=name, metadata=fields) if name == HEADER_RECORD:
+                header = decode_header(fields, str(path))
+            case Attachment(name=name, data=data) if name == STATE_ATTACHMENT:
+                state = unpack_first_state(data)
+            case Chunk() | Message() | DataEnd():
+                break  # the data follows; it is read when asked for
+            case _:
+                pass
+    if header is None:
+        raise TakeError(f"{path}: an MCAP file, but not a take.", "Choose a file handstudio wrote.")
+    return Take(path, header, state, _summary(path))
+
+
+def _summary(path: Path) -> Summary | None:
+    """The closing record, found through the file's index; fails where the file has no end."""
+    try:
+        with path.open("rb") as stream:
+            reader = make_reader(stream)
+            reader.get_summary()
+            for record in reader.iter_metadata():
+                if record.name == SUMMARY_RECORD:
+                    return msgspec.json.decode(record.metadata["json"], type=Summary)
+    except DAMAGE as error:
+        raise _damaged(path, error) from error
+    return None
+
+
+def unpack_first_state(data: bytes) -> FirstState:
+    """Inverse of `pack_first_state`; an unreadable state counts as none."""
+    if not data:
+        return FirstState()
+    try:
+        packed = msgspec.msgpack.decode(data, type=_PackedFirstState)
+    except msgspec.MsgspecError:
+        return FirstState()
+    return FirstState(packed.stream, packed.pipeline)
+
+
+def records_until_damage(stream: BinaryIO) -> Iterator[McapRecord]:
+    """Records in order, checksums verified; chunks opened, their messages following them.
+
+    Raises:
+        One of `DAMAGE`, where the file stops making sense.
+    """
+    reader = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT)
+    for record in reader.records:
+        yield record
+        if isinstance(record, Chunk):
+            yield from breakup_chunk(record, validate_crc=True)
+
+
+def _records(path: Path) -> Iterator[McapRecord]:
+    try:
+        with path.open("rb") as stream:
+            for record in records_until_damage(stream):
+                if isinstance(record, McapHeader) and record.profile != PROFILE:
+                    raise TakeError(
+                        f"{path}: an MCAP file of profile {record.profile!r}, not a take.",
+                        "Choose a file handstudio wrote, or import a folder.",
+                    )
+                yield record
+    except OSError as error:
+        raise TakeError(
+            f"{path}: cannot be opened ({error.strerror or error}).", "Check the path."
+        ) from error
+    except DAMAGE as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception | None) -> TakeError:
+    with path.open("rb") as stream:
+        ours = stream.read(8) == b"\x89MCAP0\r\n"
+    if not ours:
+        return TakeError(f"{path}: not a take.", "Choose a file that ends in .mcap.")
+    why = f" ({type(error).__name__}: {error})" if error else ""
+    return TakeError(
+        f"{path}: the file is damaged or cut short{why}.",
+        f"Get back what is readable: handstudio recover '{path}'.",
+    )

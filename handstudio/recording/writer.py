@@ -1,0 +1,144 @@
+"""Writing a take: append-only, chunked, checksummed; what was flushed survives a crash."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+from mcap.writer import Writer
+
+from handstudio import __version__
+from handstudio.errors import TakeError
+from handstudio.recording.header import (
+    HEADER_RECORD,
+    PROFILE,
+    SAMPLES_TOPIC,
+    STATE_ATTACHMENT,
+    SUMMARY_RECORD,
+    WIRE_TOPIC,
+    Header,
+    Summary,
+    encode_header,
+)
+from handstudio.recording.samples_message import encode_samples
+from handstudio.samples import ImuSamples
+
+FLUSH_S = 0.25
+"""How often a recording is handed to the operating system: the most a crash can cost."""
+
+UNFINISHED = ".recording"
+"""Suffix of a take that is being written, or was when the computer went down."""
+
+
+class TakeWriter:
+    """Writes one take; not to be shared between threads.
+
+    The file is called ``NAME.mcap.recording`` until `close` gives it its name: a file called
+    ``NAME.mcap`` is always whole, and never changes again.
+
+    Args:
+        path: The file to become, ending in ``.mcap``.
+        header: What the take says of itself.
+        first_state: Decoder and pipeline state at the first byte (empty: from the start).
+
+    Raises:
+        TakeError: the file exists already, or cannot be written.
+    """
+
+    def __init__(self, path: Path, header: Header, first_state: bytes = b"") -> None:
+        self.path = path
+        self.bytes = 0
+        self.chunks = 0
+        self._unfinished = path.with_name(path.name + UNFINISHED)
+        self._flushed_at = time.monotonic()
+        self._stream = self._create()
+        with self._saying_what_to_do():
+            self._writer = Writer(self._stream, chunk_size=1 << 20)
+            self._writer.start(PROFILE, f"handstudio {__version__}")
+            self._writer.add_metadata(HEADER_RECORD, encode_header(header))
+            self._writer.add_attachment(
+                header.start_utc_ns,
+                header.start_utc_ns,
+                STATE_ATTACHMENT,
+                "application/octet-stream",
+                first_state,
+            )
+            topic = WIRE_TOPIC if header.kind == "wire" else SAMPLES_TOPIC
+            self._channel = self._writer.register_channel(topic, "application/octet-stream", 0)
+            self.flush()
+
+    def write(self, arrival_ns: int, chunk: bytes) -> None:
+        """Append bytes as they arrived; flushes when it is time.
+
+        Raises:
+            TakeError: the disk is full or gone. What was flushed before is safe.
+        """
+        with self._saying_what_to_do():
+            self._writer.add_message(self._channel, arrival_ns, chunk, arrival_ns, self.chunks)
+            self.bytes += len(chunk)
+            self.chunks += 1
+            if time.monotonic() - self._flushed_at >= FLUSH_S:
+                self.flush()
+
+    def write_samples(self, samples: ImuSamples, start_utc_ns: int) -> None:
+        """Append imported samples."""
+        self.write(start_utc_ns + int(samples.time_us[0]) * 1000, encode_samples(samples))
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        with self._saying_what_to_do():
+            self._writer.flush()
+            self._flushed_at = time.monotonic()
+
+    def close(self, summary: Summary | None = None) -> Path:
+        """Finish the file and give it its name."""
+        with self._saying_what_to_do():
+            if summary is not None:
+                fields = {"json": msgspec.json.encode(summary).decode()}
+                self._writer.add_metadata(SUMMARY_RECORD, fields)
+            self._writer.finish()
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+            self._stream.close()
+            _refuse_existing(self.path)
+            self._unfinished.rename(self.path)
+        return self.path
+
+    def abandon(self) -> None:
+        """Let go of the file as it is; `recover` makes a take of it."""
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.close()
+
+    def _create(self) -> BinaryIO:
+        _refuse_existing(self.path)
+        with self._saying_what_to_do():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                return self._unfinished.open("xb")
+            except FileExistsError as error:
+                raise TakeError(
+                    f"{self._unfinished} is there already: an interrupted recording.",
+                    f"Recover it first (handstudio recover '{self._unfinished}'), "
+                    "or record under another name.",
+                ) from error
+
+    @contextlib.contextmanager
+    def _saying_what_to_do(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise TakeError(
+                f"{self._unfinished}: cannot be written ({error.strerror or error}).",
+                "Free some space or check the folder's permissions. What was recorded until now "
+                f"is kept: handstudio recover '{self._unfinished}'.",
+            ) from error
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise TakeError(f"{path} exists already.", "Takes are never overwritten: choose a name.")
