@@ -74,7 +74,7 @@ def encode(packet: Sent | Request) -> bytes:
     """
     try:
         return frame(_payload(packet))
-    except struct.error as error:
+    except (struct.error, OverflowError) as error:
         raise ValueError(f"{type(packet).__name__} does not fit the wire: {error}") from error
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 
+from handstudio.errors import TakeError
 from handstudio.protocol.decoder import Decoder
 from handstudio.protocol.packets import ImuPacket, Packet, Restart
 
@@ -24,6 +25,7 @@ def check_decoder(kind: type[Decoder], stream: bytes, seed: int = 0) -> list[Pac
         _check_pieces(kind, sample, rng)
         _check_resume(kind, sample, rng)
         _check_order(kind().feed(sample))
+    _check_refusal(kind)
     return packets
 
 
@@ -61,6 +63,14 @@ def _check_order(packets: list[Packet]) -> None:
             )
             _check(later, f"the packet of sequence {packet.sequence} is not after the one before")
             last = packet
+
+
+def _check_refusal(kind: type[Decoder]) -> None:
+    try:
+        kind.restore(b"no state")
+    except TakeError:
+        return
+    raise AssertionError("what no decoder saved was restored instead of a TakeError")
 
 
 def _damaged(stream: bytes, rng: random.Random) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import Literal, Protocol, Self, TypeAlias
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 import msgspec
 
@@ -19,6 +19,7 @@ ENTRY_POINTS = "handstudio.decoders"
 """Group of entry points under which other packages offer decoders."""
 
 
+@runtime_checkable
 class Decoder(Protocol):
     """What a glove says, whatever its language. Made with no arguments, then fed.
 
@@ -36,7 +37,7 @@ class Decoder(Protocol):
         ...
 
     @classmethod
-    def restore(cls, saved: bytes) -> Self:
+    def restore(cls, saved: bytes) -> Decoder:
         """A decoder that goes on where the saved one stood.
 
         Raises:
@@ -54,16 +55,16 @@ class V1State(
 ):
     """All that a `V1Decoder` remembers. ``layout`` counts how this is saved, not the protocol."""
 
-    framing: Framing = Framing()
-    continuity: Continuity = Continuity()
-    layout: Literal[1] = 1
+    layout: Literal[1]
+    framing: Framing
+    continuity: Continuity
 
 
 class V1Decoder:
     """Our protocol, version 1. What it makes of damage, gaps and restarts: README.md."""
 
-    def __init__(self, state: V1State = V1State()) -> None:  # noqa: B008 - frozen
-        self._state = state
+    def __init__(self, state: V1State | None = None) -> None:
+        self._state = state or V1State(1, Framing(), Continuity())
 
     def feed(self, chunk: bytes) -> list[Packet]:
         """Take the next bytes as they came; return the packets they complete."""
@@ -79,7 +80,7 @@ class V1Decoder:
                 continue
             continuity, placed = follow(continuity, parsed, one.size)
             packets += placed
-        self._state = V1State(framing, continuity)
+        self._state = V1State(1, framing, continuity)
         return packets
 
     def save(self) -> bytes:
@@ -87,7 +88,7 @@ class V1Decoder:
         return msgspec.json.encode(self._state)
 
     @classmethod
-    def restore(cls, saved: bytes) -> Self:
+    def restore(cls, saved: bytes) -> V1Decoder:
         """A decoder that goes on where the saved one stood.
 
         Raises:
