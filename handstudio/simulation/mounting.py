@@ -1,0 +1,76 @@
+"""How sensors sit on their segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from handstudio.arrays import Array
+from handstudio.errors import LayoutError
+from handstudio.hand.skeleton import DISTALS, PARENTS, SEGMENTS, Skeleton
+from handstudio.layout import Layout
+from handstudio.maths import so3
+
+# Bone centre to the chip, ours: half the thickness of an adult's segment and 3 mm of board.
+_HEIGHT_M = {"forearm": 0.025, "hand": 0.016, "hand_ulnar": 0.015, "thumb_metacarpal": 0.014}
+_HEIGHT_OF_PHALANX_M = {"proximal": 0.012, "intermediate": 0.011, "distal": 0.009}
+
+# Share of the segment's length; whatever is not named sits in the middle.
+_ALONG = {"SN1": 0.70, "SN2": 0.78, "SN3": 0.86, "Tip": 1.0}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mounting:
+    """Attitude and place [m] of every sensor of a layout in its segment's frame."""
+
+    q_segment_sensor: Float[Array, "s 4"]
+    t_segment_sensor: Float[Array, "s 3"]
+
+
+def nominal_mounting(layout: Layout, skeleton: Skeleton) -> Mounting:
+    """Sensors as the glove's maker means them: axes of the segment, on its back, half way along.
+
+    The three of the forearm follow one another towards the wrist; Tip sits over the fingertip.
+
+    Raises:
+        LayoutError: a sensor sits on something that is not a segment of the hand.
+    """
+    far = _far_ends(skeleton)
+    places = []
+    for place, segment in zip(layout.sensors, segment_indices(layout), strict=True):
+        height = np.array([0.0, 0.0, _height_m(place.segment)])
+        places.append(_ALONG.get(place.sensor, 0.5) * far[segment] + height)
+    return Mounting(np.tile(so3.IDENTITY, (len(places), 1)), np.array(places))
+
+
+def segment_indices(layout: Layout) -> list[int]:
+    """Index of every sensor's segment.
+
+    Raises:
+        LayoutError: a sensor sits on something that is not a segment of the hand.
+    """
+    for place in layout.sensors:
+        if place.segment not in SEGMENTS:
+            raise LayoutError(
+                f"{place.sensor} sits on {place.segment}, which a simulated hand does not have.",
+                f"Put it on one of: {', '.join(SEGMENTS)}.",
+            )
+    return [SEGMENTS.index(place.segment) for place in layout.sensors]
+
+
+def _far_ends(skeleton: Skeleton) -> Array:
+    """The farthest joint or tip that each segment carries, in its frame [m]."""
+    ends = np.zeros((len(SEGMENTS), 3))
+    for child, parent in enumerate(PARENTS):
+        joint = skeleton.t_parent_joint[child]
+        if parent >= 0 and np.linalg.norm(joint) > np.linalg.norm(ends[parent]):
+            ends[parent] = joint
+    for tip, segment in zip(skeleton.t_distal_tip, DISTALS, strict=True):
+        ends[SEGMENTS.index(segment)] = tip
+    return ends
+
+
+def _height_m(segment: str) -> float:
+    return _HEIGHT_M.get(segment) or _HEIGHT_OF_PHALANX_M[segment.rpartition("_")[2]]
