@@ -1,0 +1,258 @@
+"""A glove made of software: a process of its own that speaks the wire protocol.
+
+``python -m handstudio.device.virtual_glove --help``. One line of JSON on standard output says
+where it is: ``{"address": "serial:/dev/pts/3"}`` or ``{"address": "tcp:127.0.0.1:40123"}``.
+It serves until told to stop: SIGINT, SIGTERM or, with ``--quit-with-parent``, the end of its input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import secrets
+import select
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.simulation.firmware import RATES_HZ, Firmware
+from handstudio.simulation.glove import WornGlove, description
+
+_LONGEST_PAUSE_S = 0.1  # how long an order to stop may go unseen
+_SHORTEST_PAUSE_S = 0.001  # a USB device is asked once a millisecond too
+_RETRY_S = 0.002  # with a full line
+_CATCH_UP = 100  # instants made in one go before the line is listened to again
+
+
+@runtime_checkable
+class Line(Protocol):
+    """Where the bytes go; nothing here waits, except `wait`."""
+
+    address: str
+
+    def read(self) -> bytes | None:
+        """What the host sent, maybe nothing; None where a host came or went."""
+
+    def write(self, data: bytes) -> int:
+        """Pass on what fits; how much that was [bytes]."""
+
+    def wait(self, seconds: float) -> None:
+        """Return after that time, or earlier when there is something to read."""
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+
+def serve(line: Line, firmware: Firmware, stop: threading.Event) -> None:
+    """Move bytes between a line and a firmware, in real time, until told to stop.
+
+    Whatever is due is made, however late: the firmware's clock keeps pace with ours.
+    """
+    began_ns = time.monotonic_ns()
+
+    def now_us() -> int:
+        return (time.monotonic_ns() - began_ns) // 1000
+
+    while not stop.is_set():
+        # each instant is offered to the line before the next is made: the device would have sent
+        # it in time, so being late must not fill its buffer
+        for _ in range(_CATCH_UP):
+            if firmware.next_due_us > now_us():
+                break
+            firmware.advance(firmware.next_due_us)
+            _send(line, firmware)
+        firmware.advance(min(now_us(), firmware.next_due_us - 1))
+        heard = line.read()
+        if heard is None:
+            firmware.plugged_in()
+        else:
+            firmware.receive(heard)
+        _send(line, firmware)
+        line.wait(_pause_s(firmware, now_us()))
+
+
+def _send(line: Line, firmware: Firmware) -> None:
+    while (waiting := firmware.outgoing) and (size := line.write(waiting)):
+        firmware.taken(size)
+
+
+def _pause_s(firmware: Firmware, now_us: int) -> float:
+    until_due = (firmware.next_due_us - now_us) * 1e-6
+    longest = _RETRY_S if firmware.outgoing else _LONGEST_PAUSE_S
+    return min(max(until_due, _SHORTEST_PAUSE_S), longest)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a virtual glove until told to stop."""
+    asked = _parser().parse_args(arguments)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    if asked.quit_with_parent:
+        threading.Thread(target=_stop_at_end_of_input, args=(stop,), daemon=True).start()
+    epoch = secrets.randbits(32) if asked.epoch is None else asked.epoch
+    firmware = Firmware(
+        description(asked.side, asked.seed, asked.rate, epoch, asked.name),
+        WornGlove(asked.side, asked.seed, asked.hand_length).read,
+        asked.tx_buffer,
+    )
+    with closing(_open(asked)) as line:
+        print(json.dumps({"address": line.address}), flush=True)
+        serve(line, firmware, stop)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="handstudio.device.virtual_glove", description=__doc__)
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--pty", action="store_true", help="a pseudo-terminal (default; not Windows)"
+    )
+    where.add_argument("--tcp", type=int, metavar="PORT", help="on 127.0.0.1; 0: any free port")
+    parser.add_argument("--link", type=Path, metavar="PATH", help="name the pseudo-terminal so")
+    parser.add_argument(
+        "--rate", type=int, choices=RATES_HZ, default=100, help="to begin with [Hz]"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="which glove: its noise and biases")
+    parser.add_argument("--side", choices=("left", "right"), default="right")
+    parser.add_argument("--hand-length", type=float, default=ADULT_HAND_LENGTH_M, help="[m]")
+    parser.add_argument("--tx-buffer", type=int, default=4096, help="[bytes]")
+    parser.add_argument("--name", default="Virtual glove")
+    parser.add_argument("--epoch", type=int, help="of this start; random unless given")
+    parser.add_argument("--quit-with-parent", action="store_true", help="stop at end of input")
+    return parser
+
+
+def _open(asked: argparse.Namespace) -> Line:
+    if asked.tcp is not None:
+        return TcpLine(asked.tcp)
+    if sys.platform == "win32":
+        if asked.pty:
+            raise SystemExit("Windows has no pseudo-terminals. Use --tcp 0.")
+        return TcpLine(0)
+    return PtyLine(asked.link)
+
+
+def _stop_at_end_of_input(stop: threading.Event) -> None:
+    # os.read, not sys.stdin: a thread that waits inside sys.stdin aborts the interpreter's exit
+    while os.read(0, 4096):
+        pass
+    stop.set()
+
+
+class TcpLine:
+    """A port on this machine's own network; one host at a time."""
+
+    _SEND_BUFFER = 16384  # as small as a device's; the default would hide seconds of a slow host
+
+    def __init__(self, port: int) -> None:
+        self._door = socket.create_server(("127.0.0.1", port))
+        self._door.setblocking(False)
+        self._host: socket.socket | None = None
+        self.address = f"tcp:127.0.0.1:{self._door.getsockname()[1]}"
+
+    def read(self) -> bytes | None:
+        """What the host sent, maybe nothing; None where a host came or went."""
+        try:
+            if self._host is None:
+                self._host = self._accept()
+                return None
+            data = self._host.recv(4096)
+        except BlockingIOError:
+            return b""
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._hang_up()
+        return data or None
+
+    def write(self, data: bytes) -> int:
+        """Pass on what fits; nothing does while nobody is there."""
+        try:
+            return 0 if self._host is None else self._host.send(data)
+        except (BlockingIOError, ConnectionError):
+            return 0  # reading tells whether the host is gone
+
+    def wait(self, seconds: float) -> None:
+        """Return after that time, or earlier when there is something to read."""
+        select.select([self._host or self._door], [], [], seconds)
+
+    def close(self) -> None:
+        """Hang up and free the port."""
+        self._hang_up()
+        self._door.close()
+
+    def _accept(self) -> socket.socket:
+        host, _ = self._door.accept()
+        host.setblocking(False)
+        host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        host.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._SEND_BUFFER)
+        return host
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._host = None
+
+
+if sys.platform != "win32":
+    import tty
+
+    class PtyLine:
+        """A pseudo-terminal, raw, maybe under a name of its own choice."""
+
+        def __init__(self, link: Path | None) -> None:
+            # the host's end stays open here too: it then keeps its bytes and its raw mode while
+            # no host is there, as a serial port does
+            self._ours, self._hosts = os.openpty()
+            tty.setraw(self._hosts)
+            os.set_blocking(self._ours, False)
+            self._path = os.ttyname(self._hosts)
+            self._link = link
+            if link is not None:
+                self._name(link)
+            self.address = f"serial:{link or self._path}"
+
+        def read(self) -> bytes | None:
+            """What the host sent, maybe nothing."""
+            try:
+                return os.read(self._ours, 4096)
+            except BlockingIOError:
+                return b""
+
+        def write(self, data: bytes) -> int:
+            """Pass on what fits."""
+            try:
+                return os.write(self._ours, data)
+            except BlockingIOError:
+                return 0
+
+        def wait(self, seconds: float) -> None:
+            """Return after that time, or earlier when there is something to read."""
+            select.select([self._ours], [], [], seconds)
+
+        def close(self) -> None:
+            """Close both ends and take the name away, if it still is ours."""
+            link = self._link
+            if link is not None and link.is_symlink() and str(link.readlink()) == self._path:
+                link.unlink()
+            os.close(self._ours)
+            os.close(self._hosts)
+
+        def _name(self, link: Path) -> None:
+            if link.exists() and not link.is_symlink():
+                raise SystemExit(f"{link} is a file of somebody's. Choose another --link.")
+            fresh = link.with_name(f"{link.name}.{os.getpid()}")
+            fresh.symlink_to(self._path)
+            fresh.replace(link)
+
+
+if __name__ == "__main__":
+    main()
