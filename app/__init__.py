@@ -1,0 +1,1 @@
+"""The studio in the browser, on viser: way of working, hand, plots, transport."""

@@ -8,6 +8,6 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-import numpy as np
+import numpy.typing as npt
 
-Array: TypeAlias = np.ndarray[Any, Any]
+Array: TypeAlias = npt.NDArray[Any]

@@ -65,6 +65,12 @@ def process(
     return _open(folder)
 
 
+def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
+    """The motion of a take where it was computed before, else None."""
+    folder = motion_folder(take, setup or take.header.setup, from_start=False)
+    return _open(folder) if (folder / "meta.json").exists() else None
+
+
 def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:
     """Where the motion of a take under a setup is kept."""
     parts = f"{take.sha256()} {setup.key} {__version__} {from_start}"

@@ -22,8 +22,8 @@ STANDARD_GRAVITY = 9.80665  # [m/s²]
 FULL_SCALE = 32768
 
 
-@dataclass(frozen=True, slots=True)
-class ImuSamples:
+@dataclass(frozen=True, slots=True, eq=False)
+class ImuSamples:  # noqa: PLW1641 - arrays have no hash
     """A run of consecutive instants of all sensors, none missing between them."""
 
     time_us: Int64[Array, " n"]

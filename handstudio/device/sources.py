@@ -14,7 +14,7 @@ import contextlib
 import select
 import socket
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 from urllib.parse import parse_qsl, urlsplit
 
 import serial
@@ -26,6 +26,7 @@ class SourceLost(Exception):  # noqa: N818 - an event of daily life, not a mista
     """The other end went away: cable out, process gone, file at its end."""
 
 
+@runtime_checkable
 class ByteSource(Protocol):
     """An open line to a device."""
 

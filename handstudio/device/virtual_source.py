@@ -14,6 +14,9 @@ from handstudio.errors import DeviceError
 START_S = 20.0
 """How long a virtual glove may take to start on a busy machine."""
 
+_TX_BUFFER = 65536
+"""Of our own glove [bytes]: rides out 160 ms of a busy machine at 1000 Hz."""
+
 _OPTIONS = ("rate", "seed", "side", "hand-length", "name", "epoch")
 
 
@@ -70,6 +73,7 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
         )
     tcp = options.get("transport") == "tcp" or sys.platform == "win32"
     command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--quit-with-parent"]
+    command += ["--tx-buffer", str(_TX_BUFFER)]
     command += ["--tcp", "0"] if tcp else ["--pty"]
     for option in _OPTIONS:
         if option in options:

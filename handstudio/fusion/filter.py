@@ -7,7 +7,7 @@ magnetic field.
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from jaxtyping import Bool, Float
 
@@ -17,6 +17,7 @@ from handstudio.samples import ImuSamples
 State = TypeVar("State")
 
 
+@runtime_checkable
 class Filter(Protocol[State]):
     """A fusion filter over all sensors of a layout."""
 

@@ -33,7 +33,8 @@ def multiply(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[Array,
 
 def conjugate(q: Float[Array, "*b 4"]) -> Float[Array, "*b 4"]:
     """Invert rotations: ``q_b_a = conjugate(q_a_b)``."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    inverse: Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return inverse
 
 
 def rotate(q: Float[Array, "*#b 4"], v: Float[Array, "*#b 3"]) -> Float[Array, "*b 3"]:
@@ -78,7 +79,8 @@ def log(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3"]:
 
 def angle_between(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[Array, "*b"]:
     """Angle [rad] of the rotation that takes one orientation to the other, in [0, pi]."""
-    return np.linalg.norm(log(multiply(conjugate(p), q)), axis=-1)
+    angle: Array = np.linalg.norm(log(multiply(conjugate(p), q)), axis=-1)
+    return angle
 
 
 def to_matrix(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3 3"]:

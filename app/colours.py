@@ -1,0 +1,51 @@
+"""One colour a finger, the same in 3-D, plots and exports; safe for colour-blind eyes.
+
+After Okabe and Ito, Color Universal Design (2008), the green lightened for dark pages.
+"""
+
+from __future__ import annotations
+
+THUMB = (230, 159, 0)
+INDEX = (86, 180, 233)
+MIDDLE = (0, 178, 130)
+RING = (213, 94, 0)
+LITTLE = (204, 121, 167)
+WRIST = (226, 216, 178)
+FOREARM = (150, 162, 184)
+ALARM = (226, 75, 74)
+DEAD = (104, 108, 116)
+
+PARTS = {
+    "thumb": THUMB,
+    "index": INDEX,
+    "middle": MIDDLE,
+    "ring": RING,
+    "little": LITTLE,
+    "hand": WRIST,
+    "wrist": WRIST,
+    "forearm": FOREARM,
+    "elbow": FOREARM,
+}
+
+_CYCLE = (INDEX, THUMB, MIDDLE, LITTLE, RING, WRIST, FOREARM)
+
+
+def of_part(name: str) -> tuple[int, int, int]:
+    """Colour of a segment, joint or angle, by the finger or part its name begins with."""
+    return PARTS.get(name.split("_", maxsplit=1)[0], FOREARM)
+
+
+def of_index(index: int) -> tuple[int, int, int]:
+    """Colours for things that are no part of a hand."""
+    return _CYCLE[index % len(_CYCLE)]
+
+
+def css(colour: tuple[int, int, int]) -> str:
+    """A colour as a page writes it."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def pale(colour: tuple[int, int, int]) -> tuple[int, int, int]:
+    """The same colour in doubt: half way to grey."""
+    red, green, blue = ((channel + 2 * 120) // 3 for channel in colour)
+    return red, green, blue

@@ -1,0 +1,38 @@
+"""The meshes that are drawn: from the package, or from the checkout beside it."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from jaxtyping import Float, Int
+
+from handstudio.arrays import Array
+from handstudio.errors import HandstudioError
+
+_PLACES = (
+    Path(__file__).parent / "assets" / "meshes",
+    Path(__file__).parents[1] / "assets" / "meshes",
+)
+
+
+@cache
+def mesh(name: str, mirrored: bool = False) -> tuple[Float[Array, "v 3"], Int[Array, "f 3"]]:
+    """Vertices and faces of a mesh by name; mirrored in x for left hands.
+
+    Raises:
+        HandstudioError: the installation lacks it.
+    """
+    for folder in _PLACES:
+        path = folder / f"{name}.ply"
+        if path.exists():
+            loaded = trimesh.load_mesh(path, process=False)
+            vertices, faces = np.array(loaded.vertices, dtype=float), np.array(loaded.faces)
+            if mirrored:
+                return vertices * [-1.0, 1.0, 1.0], faces[:, ::-1]
+            return vertices, faces
+    raise HandstudioError(
+        f"The mesh {name} is missing from this installation.", "Install handstudio anew."
+    )

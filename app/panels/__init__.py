@@ -1,0 +1,1 @@
+"""Panels translate: a person's doings into intents, a view into what the page shows."""

@@ -1,0 +1,97 @@
+"""Device: which glove, how it does, which of its sensors is which."""
+
+from __future__ import annotations
+
+import viser
+
+from app import intents
+from app.panels.base import Send, put
+from app.studio import State
+from app.words import _
+from handstudio.device.capture import Phase
+
+
+class DevicePanel:
+    """Choose a device and see what it says of itself."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._send = send
+        self._addresses: dict[str, str] = {}
+        self._choice = gui.add_dropdown(
+            _("Device"), (_("Virtual glove (showcase)"),), hint=_("Devices that were found")
+        )
+        self._address = gui.add_text(
+            _("or address"),
+            "",
+            hint=_("serial:/dev/ttyACM0, tcp:HOST:PORT or replay:TAKE.mcap"),
+        )
+        self._connect = gui.add_button(_("Connect"), icon=viser.Icon.PLUG_CONNECTED)
+        self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH)
+        self._facts = gui.add_markdown("")
+        self._blink_choice = gui.add_dropdown(_("Sensor"), ("SN1",), visible=False)
+        self._blink = gui.add_button(
+            _("Blink this sensor"),
+            icon=viser.Icon.BULB,
+            hint=_("Its light on the glove blinks for three seconds"),
+            visible=False,
+        )
+        self._connected = False
+        self._connect.on_click(lambda _event: self._toggle())
+        self._find.on_click(lambda _event: send(intents.FindDevices()))
+        self._blink.on_click(lambda _event: send(intents.BlinkSensor(self._blink_choice.value)))
+
+    def render(self, state: State) -> None:
+        """Show devices and what the present one says of itself."""
+        labels = {found.label: found.address for found in state.devices}
+        if labels != self._addresses:
+            self._addresses = labels
+            self._choice.options = tuple(labels)
+        newest = state.newest
+        self._connected = newest.phase in (Phase.CONNECTING, Phase.STREAMING, Phase.LOST)
+        put(self._connect, label=_("Disconnect") if self._connected else _("Connect"))
+        put(self._choice, disabled=self._connected)
+        put(self._address, disabled=self._connected)
+        looking = _("Looking …") if state.searching else _("Look for devices")
+        put(self._find, label=looking, disabled=state.searching)
+        self._render_facts(state)
+
+    def _toggle(self) -> None:
+        if self._connected:
+            self._send(intents.DisconnectDevice())
+            return
+        address = self._address.value.strip() or self._addresses.get(self._choice.value, "virtual:")
+        self._send(intents.ConnectDevice(address))
+
+    def _render_facts(self, state: State) -> None:
+        description = state.newest.description
+        present = description is not None and state.newest.setup is not None
+        put(self._blink_choice, visible=present)
+        put(self._blink, visible=present)
+        put(self._facts, content=_facts(state))
+        if present and state.newest.setup is not None:
+            names = state.newest.setup.layout.names
+            if self._blink_choice.options != names:
+                self._blink_choice.options = names
+
+
+def _facts(state: State) -> str:
+    newest = state.newest
+    description = newest.description
+    if description is None:
+        return ""
+    health = newest.health
+    side = {"left": _("left hand"), "right": _("right hand")}.get(
+        description.side, _("side not told")
+    )
+    rows = [
+        (description.name, f"{description.serial_number}, {side}"),
+        (_("Firmware"), description.firmware),
+        (_("Sensors"), f"{len(description.sensors)} @ {description.rate_hz} Hz"),
+        (_("Lost, damaged"), f"{health.missing}, {health.damaged}"),
+        (_("Dropped by device"), f"{health.dropped_by_device}"),
+    ]
+    if health.drift_ppm is not None:
+        rows.append((_("Clock drift"), f"{health.drift_ppm:+.0f} ppm"))
+    if health.celsius is not None:
+        rows.append((_("Warmest sensor"), f"{health.celsius:.0f} °C"))
+    return "\n".join(["| | |", "|---|---|", *(f"| {key} | {value} |" for key, value in rows)])

@@ -1,0 +1,118 @@
+"""Plots on the right: angles over time, the playhead, the same seconds in all of them."""
+
+from __future__ import annotations
+
+import html
+
+import numpy as np
+import viser
+from viser import uplot
+
+from app import colours
+from app.channels import Plot
+from app.view import Curves
+from app.words import _
+from handstudio.arrays import Array
+
+_HEIGHT = 164
+_AXIS = "#9aa0aa"
+_GRID: uplot.Axis_Grid = {"stroke": "rgba(128,132,140,0.22)", "width": 1}
+
+
+class PlotsPanel:
+    """Stacked plots; made anew only when other curves are to be shown."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._gui = gui
+        self._panel = gui.add_panel()
+        self._tab = self._panel.add_tab(_("Angles"), viser.Icon.CHART_LINE)
+        self._panel.dock_right()
+        self._panel.set_width(400.0)
+        with self._tab:
+            self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
+        self._plots: tuple[Plot, ...] = ()
+        self._heads: list[viser.GuiHtmlHandle] = []
+        self._handles: list[viser.GuiUplotHandle] = []
+
+    def render(self, curves: Curves | None) -> None:
+        """Show curves, or that there are none."""
+        plots = curves.plots if curves is not None else ()
+        if plots != self._plots:
+            self._build(plots)
+        if curves is None:
+            return
+        first = 0
+        for plot, handle in zip(plots, self._handles, strict=True):
+            last = first + len(plot.curves)
+            handle.data = _data(curves, curves.values[:, first:last])
+            first = last
+
+    def _build(self, plots: tuple[Plot, ...]) -> None:
+        for handle in (*self._heads, *self._handles):
+            handle.remove()
+        self._heads, self._handles = [], []
+        self._plots = plots
+        self._empty.visible = not plots
+        with self._tab:
+            for plot in plots:
+                self._heads.append(self._gui.add_html(_head(plot)))
+                self._handles.append(self._add(plot))
+
+    def _add(self, plot: Plot) -> viser.GuiUplotHandle:
+        curves = tuple(
+            uplot.Series(label=curve.label, stroke=colours.css(curve.colour), width=1.5)
+            for curve in plot.curves
+        )
+        playhead = uplot.Series(label=_("now"), stroke="#8a909a", width=1)
+        return self._gui.add_uplot(
+            data=tuple(np.zeros(1) for _ in range(len(curves) + 2)),
+            series=(uplot.Series(label="s"), *curves, playhead),
+            scales={"x": {"time": False}},
+            axes=(
+                {"stroke": _AXIS, "grid": _GRID, "size": 30},
+                {"stroke": _AXIS, "grid": _GRID, "size": 38},
+            ),
+            legend={"show": False},
+            height=_HEIGHT,
+            padding=(8, 12, 0, 0),
+        )
+
+
+def _head(plot: Plot) -> str:
+    """Title, unit and which colour is what, in one line above the plot."""
+    labels = " ".join(
+        f'<span style="color:{colours.css(curve.colour)};white-space:nowrap">'
+        f"&#9632; {html.escape(curve.label)}</span>"
+        for curve in plot.curves
+    )
+    return (
+        '<div style="font-size:.78rem;line-height:1.3;padding:.35em .75em 0">'
+        f"<b>{html.escape(plot.title)} [°]</b> {labels}</div>"
+    )
+
+
+def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
+    """Aligned data: time, the curves, and the playhead as a step from the lowest to the highest.
+
+    The step's level parts lie on the frame of the plot and hold its limits still. Holes (NaN)
+    would upset the page's own ranging, so there are none.
+    """
+    low, high = _limits(values)
+    time_s, columns = curves.time_s, list(values.T)
+    now = curves.to_s if curves.now_s is None else curves.now_s
+    at = min(max(int(np.searchsorted(time_s, now)), 1), len(time_s))
+    thin = (curves.to_s - curves.from_s) * 1e-5
+    edge = [max(now - thin, time_s[at - 1]), now + thin]
+    columns = [np.insert(column, at, [column[at - 1]] * 2) for column in columns]
+    step = np.where(np.arange(len(time_s) + 2) <= at, low, high)
+    return (np.insert(time_s, at, edge), *columns, step)
+
+
+def _limits(values: Array) -> tuple[float, float]:
+    """Whole tens around all that is shown, at least 40 degrees apart."""
+    if not np.isfinite(values).any():
+        return -20.0, 20.0
+    low = float(np.floor(np.nanmin(values) / 10.0) * 10.0)
+    high = float(np.ceil(np.nanmax(values) / 10.0) * 10.0)
+    lacking = max(0.0, 40.0 - (high - low))
+    return low - lacking / 2, high + lacking / 2

@@ -1,0 +1,100 @@
+"""A take on the screen: its motion, where in it we are, and how fast it plays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from app.channels import values_of
+from handstudio.arrays import Array
+from handstudio.errors import TakeError
+from handstudio.pipeline import Motion
+from handstudio.recording.take import Take
+from handstudio.setup import Setup
+
+_PLOTTED = 1500  # instants in a plot of the whole take: more than it has pixels
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Review:
+    """An opened take."""
+
+    take: Take
+    motion: Motion
+    time_s: Float[Array, " n"]
+    plot_time_s: Float[Array, " p"]
+    plot_values: Float[Array, "p c"]
+    at_s: float = 0.0
+    playing: bool = False
+    speed: float = 1.0
+
+    @property
+    def setup(self) -> Setup:
+        """What decided this motion."""
+        return self.take.header.setup
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last instant."""
+        return float(self.time_s[-1])
+
+    @property
+    def index(self) -> int:
+        """The instant that is shown: the last one not after the time we are at."""
+        found = int(np.searchsorted(self.time_s, self.at_s + 1e-9, side="right")) - 1
+        return min(max(found, 0), len(self.time_s) - 1)
+
+    @property
+    def instant(self) -> Motion:
+        """The motion at this instant."""
+        return self.motion[self.index : self.index + 1]
+
+
+def opened(take: Take, motion: Motion) -> Review:
+    """A take at its beginning, paused.
+
+    Raises:
+        TakeError: nothing moves in it.
+    """
+    if len(motion) == 0:
+        raise TakeError(
+            f"{take.path.name} holds no instant of motion.",
+            "The device sent nothing while it was recorded; record it again.",
+        )
+    time_s = np.asarray((motion.time_us - motion.time_us[0]) * 1e-6)
+    shown = np.unique(np.linspace(0, len(time_s) - 1, _PLOTTED).round().astype(int))
+    few = Motion(*(getattr(motion, name)[shown] for name in Motion.__slots__))
+    return Review(take, motion, time_s, time_s[shown], values_of(take.header.setup, few))
+
+
+def advanced(review: Review, elapsed_s: float) -> Review:
+    """Play on; stops at the end."""
+    if not review.playing:
+        return review
+    at = review.at_s + elapsed_s * review.speed
+    if at >= review.duration_s:
+        return replace(review, at_s=review.duration_s, playing=False)
+    return replace(review, at_s=at)
+
+
+def sought(review: Review, at_s: float) -> Review:
+    """Go to a time, pausing."""
+    return replace(review, at_s=min(max(at_s, 0.0), review.duration_s), playing=False)
+
+
+def stepped(review: Review, instants: int) -> Review:
+    """Go some instants on or back, pausing."""
+    index = min(max(review.index + instants, 0), len(review.time_s) - 1)
+    return sought(review, float(review.time_s[index]))
+
+
+def toggled(review: Review) -> Review:
+    """Play or pause; at the end playing begins again."""
+    at_end = review.at_s >= review.duration_s - 1e-9
+    if not review.playing and at_end:
+        return replace(review, at_s=0.0, playing=True)
+    return replace(review, playing=not review.playing)

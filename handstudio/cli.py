@@ -1,0 +1,302 @@
+"""The shell: ``handstudio COMMAND``; every command explains itself with ``--help``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import tyro
+
+from handstudio.device import find
+from handstudio.device.capture import Capture, Connect, Phase, StartTake, StopTake
+from handstudio.errors import DeviceError, HandstudioError
+from handstudio.export.csv import Content, Window, export_csv
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.process import process as process_take
+from handstudio.recording import library
+from handstudio.recording.header import Header
+from handstudio.recording.raw_import import import_folder
+from handstudio.recording.recovery import recover as recover_file
+from handstudio.recording.take import Take, open_take
+from handstudio.setup import HandModel, filter_named
+from handstudio.shell import out, print_error, print_json, print_table, progress
+
+Sessions = Annotated[
+    Path | None, tyro.conf.arg(help="Folder of the takes (default: ./sessions in a checkout)")
+]
+Json = Annotated[bool, tyro.conf.arg(help="Print JSON for a program instead of words")]
+TakeFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TAKE.mcap")]
+
+CONNECT_S = 25.0
+
+
+def studio(
+    *,
+    virtual: bool = False,
+    connect: str | None = None,
+    port: int = 8765,
+    sessions: Sessions = None,
+    browser: bool = True,
+) -> int:
+    """Open the studio in the browser.
+
+    Args:
+        virtual: Begin with the virtual glove.
+        connect: Begin with this device (serial:/dev/ttyACM0, tcp:HOST:PORT, replay:TAKE.mcap).
+        port: Port of the page; the next free one is taken where this is in use.
+        sessions: Folder of the takes.
+        browser: Open the page in the browser.
+    """
+    from app.__main__ import run  # noqa: PLC0415 - the page's libraries only where it is wanted
+
+    address = connect or ("virtual:" if virtual else None)
+    return run(library.sessions_folder(sessions), address=address, port=port, browser=browser)
+
+
+def devices(*, json: Json = False) -> int:
+    """List the devices that could be connected, and ask each port who is there."""
+    found = [*(find.probe(port.address) for port in find.ports()), find.VIRTUAL]
+    if json:
+        print_json([asdict(one) for one in found])
+        return 0
+    rows = [[one.address, one.label, one.problem or "ready"] for one in found]
+    print_table("Devices", ["address", "what it is", "state"], rows)
+    out.print("\nConnect with: handstudio studio --connect ADDRESS")
+    return 0
+
+
+def record(
+    address: Annotated[str, tyro.conf.Positional],
+    *,
+    seconds: float | None = None,
+    subject: str = "S01",
+    name: str = "take",
+    hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
+    sessions: Sessions = None,
+    json: Json = False,
+) -> int:
+    """Record a take without the page. Ctrl-C ends it; nothing is lost.
+
+    Args:
+        address: The device (handstudio devices lists them; virtual: is always there).
+        seconds: How long; until Ctrl-C unless given.
+        subject: Code of the person.
+        name: Name of the take.
+        hand_length_mm: Wrist crease to the tip of the middle finger.
+        sessions: Folder of the takes.
+        json: Print JSON for a program instead of words.
+    """
+    path = library.new_take_path(
+        library.sessions_folder(sessions), subject, name, datetime.now().astimezone()
+    )
+    capture = Capture()
+    capture.start()
+    try:
+        capture.send(Connect(address, HandModel(hand_length_m=hand_length_mm * 1e-3)))
+        _await_stream(capture)
+        capture.send(StartTake(path, subject))
+        _record_for(capture, seconds, json)
+    finally:
+        capture.send(StopTake())
+        capture.stop()
+    for report in capture.reports():
+        if isinstance(report, HandstudioError):
+            raise report
+    return _tell_take(open_take(path), json)
+
+
+def info(take: TakeFile, *, json: Json = False) -> int:
+    """Say what a take holds."""
+    return _tell_take(open_take(take), json)
+
+
+def process(
+    takes: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    *,
+    filter: str | None = None,
+    from_start: bool = False,
+    csv: bool = False,
+    json: Json = False,
+) -> int:
+    """Fuse takes to motion; the result is kept beside each take and found there next time.
+
+    Args:
+        takes: The takes.
+        filter: Another filter than the take was recorded with (vqf).
+        from_start: Ignore what the studio knew before the first byte of the take.
+        csv: Also write the joint angles (orientations, where there is no hand) beside each take.
+        json: Print JSON for a program instead of words.
+    """
+    results = []
+    for path in takes:
+        take = open_take(path)
+        setup = take.header.setup
+        if filter is not None:
+            setup = msgspec.structs.replace(setup, filter=filter_named(filter))
+        with progress(path.name, quiet=json) as share:
+            motion = process_take(take, setup, from_start=from_start, progress=share)
+        result: dict[str, Any] = {"take": str(path), "instants": len(motion)}
+        if csv:
+            content: Content = "angles" if setup.layout.is_hand else "orientations"
+            target = path.with_suffix(f".{content}.csv")
+            result["csv"] = str(export_csv(take, setup, motion, target, content=content))
+        results.append(result)
+    if json:
+        print_json(results)
+    else:
+        for result in results:
+            out.print("  ".join(str(value) for value in result.values()))
+    return 0
+
+
+def export(
+    take: TakeFile,
+    *,
+    content: Content = "angles",
+    to: Path | None = None,
+    start_s: float = 0.0,
+    end_s: float | None = None,
+) -> int:
+    """Write joint angles, orientations or positions as CSV with a sidecar JSON.
+
+    Args:
+        take: The take.
+        content: What to write.
+        to: The file to write; beside the take unless given.
+        start_s: Begin of the window, seconds from the take's first instant.
+        end_s: End of the window; the end of the take unless given.
+    """
+    opened = open_take(take)
+    setup = opened.header.setup
+    with progress(take.name) as share:
+        motion = process_take(opened, progress=share)
+    target = to or take.with_suffix(f".{content}.csv")
+    window = Window(start_s, end_s)
+    export_csv(opened, setup, motion, target, content=content, window=window)
+    out.print(str(target))
+    return 0
+
+
+def import_(
+    folder: Annotated[Path, tyro.conf.Positional],
+    *,
+    subject: str = "S01",
+    name: str | None = None,
+    hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
+    sessions: Sessions = None,
+) -> int:
+    """Turn a folder of foreign recordings (docs/import.md) into a take.
+
+    Args:
+        folder: Holds samples.csv or samples.parquet; may hold labels, reference, layout.toml.
+        subject: Code of the person.
+        name: Name of the take; the folder's unless given.
+        hand_length_mm: Wrist crease to the tip of the middle finger.
+        sessions: Folder of the takes.
+    """
+    hand = HandModel(hand_length_m=hand_length_mm * 1e-3)
+    path = import_folder(folder, library.sessions_folder(sessions), subject, name, hand)
+    out.print(str(path))
+    return 0
+
+
+def recover(file: Annotated[Path, tyro.conf.Positional], *, json: Json = False) -> int:
+    """Get back all that was saved of an interrupted or damaged recording, as a new take."""
+    got = recover_file(file)
+    if json:
+        print_json({**asdict(got), "path": str(got.path)})
+    else:
+        out.print(f"{got.path}  {got.duration_s:.2f} s, {got.bytes} bytes")
+    return 0
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "studio": studio,
+    "devices": devices,
+    "record": record,
+    "info": info,
+    "process": process,
+    "export": export,
+    "import": import_,
+    "recover": recover,
+}
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of the ``handstudio`` command."""
+    try:
+        code = tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="handstudio",
+            description="Capture, show and measure the motion of a hand. "
+            "New here? handstudio studio --virtual",
+            args=arguments,
+        )
+    except HandstudioError as error:
+        print_error(error)
+        code = 1
+    except KeyboardInterrupt:
+        code = 130
+    sys.exit(code)
+
+
+def _await_stream(capture: Capture) -> None:
+    end = time.monotonic() + CONNECT_S
+    while capture.newest.phase is not Phase.STREAMING:
+        problem = capture.newest.problem
+        if capture.newest.phase is Phase.FAILED and problem is not None:
+            raise problem
+        if time.monotonic() > end:
+            raise DeviceError(
+                f"No data came within {CONNECT_S:.0f} s.", "Check the device: handstudio devices."
+            )
+        time.sleep(0.02)
+
+
+def _record_for(capture: Capture, seconds: float | None, quiet: bool) -> None:
+    words = "recording, Ctrl-C ends it" if seconds is None else "recording"
+    began = time.monotonic()
+    with progress(words, quiet) as share:
+        try:
+            while seconds is None or time.monotonic() - began < seconds:
+                share((time.monotonic() - began) / seconds if seconds else 0.0)
+                time.sleep(0.05)
+        except KeyboardInterrupt:
+            out.print("Ending the take.")
+
+
+def _tell_take(take: Take, json: bool) -> int:
+    header, summary = take.header, take.summary
+    if json:
+        print_json({"path": str(take.path), "header": header, "summary": summary})
+        return 0
+    rows = [[key, value] for key, value in _facts(header).items()]
+    if summary is not None:
+        lost = f"{summary.missing} of {summary.packets + summary.missing} instants"
+        rows += [["duration", f"{summary.duration_s:.2f} s"], ["lost", lost]]
+    print_table(str(take.path), ["", ""], rows)
+    return 0
+
+
+def _facts(header: Header) -> dict[str, str]:
+    setup = header.setup
+    start = datetime.fromtimestamp(header.start_utc_ns * 1e-9, UTC)
+    device = setup.device
+    return {
+        "subject": header.subject,
+        "hand": setup.layout.side if setup.layout.is_hand else setup.layout.missing_for_hand,
+        "hand length": f"{setup.hand.hand_length_m * 1e3:.0f} mm",
+        "start": f"{start:%Y-%m-%d %H:%M:%S} UTC",
+        "device": f"{device.name} ({device.serial_number})" if device else header.source,
+        "sensors": ", ".join(setup.layout.names),
+        "rate": f"{setup.rate_hz:g} Hz",
+        "calibration": setup.calibration,
+        "zero of angles": setup.zero,
+        "software": f"handstudio {header.software}",
+    }
