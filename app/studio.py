@@ -23,9 +23,10 @@ from app.live import LiveHistory
 from app.review import Review
 from app.words import _
 from handstudio.device import find
-from handstudio.device.capture import (
+from handstudio.device.capture import Capture
+from handstudio.device.find import Found
+from handstudio.device.orders import (
     Ask,
-    Capture,
     Connect,
     Disconnect,
     Newest,
@@ -35,7 +36,6 @@ from handstudio.device.capture import (
     StopTake,
     TakeDone,
 )
-from handstudio.device.find import Found
 from handstudio.errors import HandstudioError
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.kinematics import segment_attitudes

@@ -13,8 +13,8 @@ from app.live import SPAN_S
 from app.studio import State
 from app.words import _
 from handstudio.arrays import Array
-from handstudio.device.capture import Newest, Phase
 from handstudio.device.health import HealthView
+from handstudio.device.orders import Newest, Phase
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import Skeleton
 from handstudio.kinematics import doubtful_segments, pose_of, skeleton_of

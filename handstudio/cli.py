@@ -14,15 +14,17 @@ import msgspec
 import tyro
 
 from handstudio.device import find
-from handstudio.device.capture import Capture, Connect, Phase, StartTake, StopTake
+from handstudio.device.capture import Capture
+from handstudio.device.orders import Connect, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
 from handstudio.recording.raw_import import import_folder
 from handstudio.recording.recovery import recover as recover_file
+from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.take import Take, open_take
 from handstudio.setup import HandModel, filter_named
 from handstudio.shell import out, print_error, print_json, print_table, progress
@@ -216,6 +218,37 @@ def recover(file: Annotated[Path, tyro.conf.Positional], *, json: Json = False) 
     return 0
 
 
+def simulate(
+    *,
+    seconds: float = 40.0,
+    rate: int = 100,
+    seed: int = 0,
+    side: HandSide = "right",
+    hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
+    out_folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None,
+) -> int:
+    """Write a take of the virtual glove's showcase, and the truth beside it.
+
+    Args:
+        seconds: How long; one round of the showcase takes 40.
+        rate: Samples a second.
+        seed: Which glove: its sensors' errors.
+        side: Which hand.
+        hand_length_mm: Wrist crease to the tip of the middle finger.
+        out_folder: Folder of the takes (default: as the studio's).
+    """
+    path = simulate_take(
+        library.sessions_folder(out_folder),
+        seconds=seconds,
+        rate_hz=rate,
+        seed=seed,
+        side=side,
+        hand=HandModel(hand_length_m=hand_length_mm * 1e-3),
+    )
+    out.print(str(path))
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "studio": studio,
     "devices": devices,
@@ -225,6 +258,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "export": export,
     "import": import_,
     "recover": recover,
+    "simulate": simulate,
 }
 
 

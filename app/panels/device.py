@@ -8,7 +8,7 @@ from app import intents
 from app.panels.base import Send, put
 from app.studio import State
 from app.words import _
-from handstudio.device.capture import Phase
+from handstudio.device.orders import Phase
 
 
 class DevicePanel:

@@ -11,7 +11,7 @@ from app.panels.base import Send, put
 from app.studio import HAND_LENGTH_MM, State
 from app.view import recording_of
 from app.words import _
-from handstudio.device.capture import Phase
+from handstudio.device.orders import Phase
 
 RED = (200, 52, 52)
 

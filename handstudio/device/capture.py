@@ -13,17 +13,29 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass, replace
-from enum import Enum
-from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from handstudio import pipeline
-from handstudio.device.health import HealthCount, HealthView
+from handstudio.device.addresses import open_source
+from handstudio.device.health import HealthCount
 from handstudio.device.host_clock import now_ns
+from handstudio.device.orders import (
+    Ask,
+    Connect,
+    Disconnect,
+    Newest,
+    Order,
+    Phase,
+    Report,
+    SetHand,
+    StartTake,
+    StopTake,
+    TakeDone,
+)
 from handstudio.device.recorder import Recorder
-from handstudio.device.sources import ByteSource, SourceLost, open_source
+from handstudio.device.source import ByteSource, SourceLost
 from handstudio.errors import DeviceError, HandstudioError
 from handstudio.pipeline import Motion
 from handstudio.protocol.codec import encode
@@ -38,7 +50,7 @@ from handstudio.protocol.packets import (
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.take import FirstState, pack_first_state
 from handstudio.samples import Ranges
-from handstudio.setup import HandModel, Setup, for_device
+from handstudio.setup import HandModel, for_device
 from handstudio.stream import EventStream
 
 T = TypeVar("T")
@@ -50,88 +62,6 @@ RETRY_S = 0.25  # between attempts to reach a lost device
 INTRODUCTION_S = 4.0  # a device that has not described itself by then is not one of ours
 ASK_S = 0.5  # between two questions for a description
 HISTORY = 2000  # motions kept for `drain`
-
-
-class Phase(Enum):
-    """Where the line to a device stands."""
-
-    IDLE = "idle"  # nobody asked for a device
-    CONNECTING = "connecting"
-    STREAMING = "streaming"
-    LOST = "lost"  # it was there; looked for until it is back
-    FAILED = "failed"  # it cannot be had; `problem` says why
-
-
-@dataclass(frozen=True, slots=True)
-class Connect:
-    """Use this device from now on."""
-
-    address: str
-    hand: HandModel = HandModel()
-    side: str = "right"  # for devices that do not know which hand they sit on
-    decoder: str = "handstudio-1"
-
-
-@dataclass(frozen=True, slots=True)
-class Disconnect:
-    """Let go of the device; a take that is being recorded ends."""
-
-
-@dataclass(frozen=True, slots=True)
-class SetHand:
-    """Another wearer: the hand model of the next take."""
-
-    hand: HandModel
-
-
-@dataclass(frozen=True, slots=True)
-class StartTake:
-    """Record from now on."""
-
-    path: Path
-    subject: str
-
-
-@dataclass(frozen=True, slots=True)
-class StopTake:
-    """End the take."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """Send a command to the device."""
-
-    command: int
-    argument: bytes = b""
-
-
-Order: TypeAlias = Connect | Disconnect | SetHand | StartTake | StopTake | Ask
-
-
-@dataclass(frozen=True, slots=True)
-class Newest:
-    """Everything the capture thread knows, at one moment."""
-
-    phase: Phase = Phase.IDLE
-    address: str = ""
-    description: Description | None = None
-    setup: Setup | None = None
-    motion: Motion | None = None  # one instant
-    health: HealthView = HealthView()
-    problem: HandstudioError | None = None
-    recorder: Recorder | None = None
-    last_reply: Reply | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class TakeDone:
-    """A take is whole."""
-
-    path: Path
-
-
-Report: TypeAlias = TakeDone | HandstudioError
-"""What the capture thread tells once: a take that is done, or something that went wrong."""
 
 
 @dataclass

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from serial.tools import list_ports
 
-from handstudio.device.sources import ByteSource, SourceLost, open_source
+from handstudio.device.addresses import open_source
+from handstudio.device.source import ByteSource, SourceLost
 from handstudio.errors import HandstudioError
 from handstudio.protocol.codec import encode
 from handstudio.protocol.decoder import decoder_named

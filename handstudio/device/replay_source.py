@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handstudio.device.sources import SourceLost
+from handstudio.device.source import SourceLost
 from handstudio.errors import DeviceError
 from handstudio.protocol.codec import encode
 from handstudio.protocol.packets import TIP_SENSOR, Description

@@ -8,7 +8,9 @@ import subprocess
 import sys
 import threading
 
-from handstudio.device.sources import ByteSource, SourceLost, TcpSource, open_source
+from handstudio.device.serial_source import SerialSource
+from handstudio.device.source import ByteSource, SourceLost
+from handstudio.device.tcp_source import TcpSource
 from handstudio.errors import DeviceError
 
 START_S = 20.0
@@ -31,7 +33,7 @@ class VirtualSource:
     def __init__(self, options: dict[str, str]) -> None:
         self._process = _start(options)
         try:
-            self._line: ByteSource = open_source(_address(self._process))
+            self._line = _line(_address(self._process))
         except DeviceError:
             self._end()
             raise
@@ -81,6 +83,11 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
     )
+
+
+def _line(address: str) -> ByteSource:
+    kind, _, place = address.partition(":")
+    return TcpSource(place) if kind == "tcp" else SerialSource(place)
 
 
 def _address(process: subprocess.Popen[str]) -> str:

@@ -1,0 +1,97 @@
+"""What the capture thread is asked for, and what it tells: values that go between threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TypeAlias
+
+from handstudio.device.health import HealthView
+from handstudio.device.recorder import Recorder
+from handstudio.errors import HandstudioError
+from handstudio.pipeline import Motion
+from handstudio.protocol.packets import Description, Reply
+from handstudio.setup import HandModel, Setup
+
+
+class Phase(Enum):
+    """Where the line to a device stands."""
+
+    IDLE = "idle"  # nobody asked for a device
+    CONNECTING = "connecting"
+    STREAMING = "streaming"
+    LOST = "lost"  # it was there; looked for until it is back
+    FAILED = "failed"  # it cannot be had; `problem` says why
+
+
+@dataclass(frozen=True, slots=True)
+class Connect:
+    """Use this device from now on."""
+
+    address: str
+    hand: HandModel = HandModel()
+    side: str = "right"  # for devices that do not know which hand they sit on
+    decoder: str = "handstudio-1"
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnect:
+    """Let go of the device; a take that is being recorded ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetHand:
+    """Another wearer: the hand model of the next take."""
+
+    hand: HandModel
+
+
+@dataclass(frozen=True, slots=True)
+class StartTake:
+    """Record from now on."""
+
+    path: Path
+    subject: str
+
+
+@dataclass(frozen=True, slots=True)
+class StopTake:
+    """End the take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Send a command to the device."""
+
+    command: int
+    argument: bytes = b""
+
+
+Order: TypeAlias = Connect | Disconnect | SetHand | StartTake | StopTake | Ask
+
+
+@dataclass(frozen=True, slots=True)
+class Newest:
+    """Everything the capture thread knows, at one moment."""
+
+    phase: Phase = Phase.IDLE
+    address: str = ""
+    description: Description | None = None
+    setup: Setup | None = None
+    motion: Motion | None = None  # one instant
+    health: HealthView = HealthView()
+    problem: HandstudioError | None = None
+    recorder: Recorder | None = None
+    last_reply: Reply | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TakeDone:
+    """A take is whole."""
+
+    path: Path
+
+
+Report: TypeAlias = TakeDone | HandstudioError
+"""What the capture thread tells once: a take that is done, or something that went wrong."""

@@ -1,0 +1,71 @@
+"""A serial port or pseudo-terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+
+import serial
+
+from handstudio.device.source import SourceLost
+from handstudio.errors import DeviceError
+
+
+class SerialSource:
+    """A serial port or pseudo-terminal, for us alone."""
+
+    def __init__(self, port: str) -> None:
+        try:
+            self._port = serial.Serial(
+                port, baudrate=1_000_000, timeout=0, write_timeout=1.0, exclusive=_exclusive()
+            )
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise _cannot_open(port, error) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes that are there, waiting up to a time for the first."""
+        try:
+            self._wait(timeout_s)
+            waiting = self._port.in_waiting
+            return bytes(self._port.read(max(1, waiting)))
+        except (serial.SerialException, OSError, TypeError) as error:
+            raise SourceLost(str(error)) from error
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        try:
+            self._port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise SourceLost(str(error)) from error
+
+    def close(self) -> None:
+        """Let go."""
+        with contextlib.suppress(serial.SerialException, OSError):
+            self._port.close()
+
+    def _wait(self, timeout_s: float) -> None:
+        if hasattr(self._port, "fileno"):
+            select.select([self._port.fileno()], [], [], timeout_s)
+        else:  # Windows: pyserial waits by itself
+            self._port.timeout = timeout_s
+
+
+def _exclusive() -> bool | None:
+    return True if hasattr(select, "poll") else None  # Windows ports are exclusive anyway
+
+
+def _cannot_open(port: str, error: Exception) -> DeviceError:
+    text = str(error)
+    if "ermission" in text or "Access is denied" in text:
+        return DeviceError(
+            f"{port}: you may not open this port.",
+            "Linux: add yourself to the port's group, sudo usermod -aG dialout $USER, and log in "
+            "again. Windows: close the program that has the port open.",
+        )
+    if "busy" in text or "lock" in text or "temporarily unavailable" in text:
+        return DeviceError(
+            f"{port}: another program has this port open.", "Close that program, then connect."
+        )
+    if "No such file" in text or "could not open port" in text or "FileNotFound" in text:
+        return DeviceError(f"{port}: there is no such port.", "Plug the device in, or look for it.")
+    return DeviceError(f"{port}: cannot be opened ({text}).", "Unplug the device and plug it in.")

@@ -1,0 +1,96 @@
+"""Takes of a virtual glove, written without waiting, with the truth in a file beside them.
+
+The truth never reaches the pipeline: comparisons read it, nothing else does.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from handstudio.hand.skeleton import HandSide, nominal_skeleton
+from handstudio.layout import glove
+from handstudio.protocol.codec import encode
+from handstudio.protocol.decoder import V1Decoder
+from handstudio.protocol.packets import Command, ImuPacket, Request
+from handstudio.recording.header import Header, Summary
+from handstudio.recording.library import new_take_path
+from handstudio.recording.writer import TakeWriter
+from handstudio.setup import HandModel, for_device
+from handstudio.simulation.firmware import Firmware
+from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.rig import signals
+from handstudio.simulation.showcase import showcase
+
+_STEP_US = 50_000  # of the glove's time in one chunk
+_ROOM = 1 << 24  # bytes: an offline line drops nothing
+
+
+def simulate(
+    sessions: Path,
+    *,
+    seconds: float,
+    rate_hz: int = 100,
+    seed: int = 0,
+    side: HandSide = "right",
+    hand: HandModel | None = None,
+    subject: str = "virtual",
+    name: str = "showcase",
+) -> Path:
+    """Write a take of the showcase, and its truth.
+
+    Raises:
+        TakeError: the take cannot be written.
+    """
+    hand = hand or HandModel()
+    told = description(side, seed, rate_hz, epoch=seed + 1, name="Virtual glove")
+    start = datetime.now(UTC)
+    start_ns = int(start.timestamp() * 1e9)
+    path = new_take_path(sessions, subject, name, start)
+    setup = for_device(told, "handstudio-1", hand)
+    worn = WornGlove(side, seed, hand.hand_length_m)
+    writer = TakeWriter(path, Header(path.stem, subject, start_ns, setup, "wire", "simulated"))
+    try:
+        clocks = _write(writer, Firmware(told, worn.read, _ROOM), seconds, start_ns)
+        writer.close(Summary(writer.chunks, writer.bytes, seconds, packets=len(clocks)))
+    finally:
+        writer.abandon()
+    _save_truth(path, side, hand.hand_length_m, clocks)
+    return path
+
+
+def truth_path(take: Path) -> Path:
+    """Where the truth of a simulated take lives."""
+    return take.with_suffix(".truth.npz")
+
+
+def _write(writer: TakeWriter, glove: Firmware, seconds: float, start_ns: int) -> np.ndarray:
+    """Let the glove perform; returns the device clock of every instant [µs]."""
+    decoder, clocks = V1Decoder(), list[int]()
+    glove.receive(encode(Request(Command.START, 0)))
+    for now_us in range(0, round(seconds * 1e6) + 1, _STEP_US):
+        glove.advance(now_us)
+        chunk = bytes(glove.outgoing)
+        glove.taken(len(chunk))
+        if chunk:
+            writer.write(start_ns + now_us * 1000, chunk)
+            packets = decoder.feed(chunk)
+            clocks += [packet.clock_us for packet in packets if isinstance(packet, ImuPacket)]
+    return np.array(clocks, dtype=np.int64)
+
+
+def _save_truth(path: Path, side: HandSide, hand_length_m: float, clocks: np.ndarray) -> None:
+    layout, skeleton = glove(side), nominal_skeleton(side, hand_length_m)
+    _, truth = signals(skeleton, layout, showcase(side), clocks - clocks[0])
+    np.savez_compressed(
+        truth_path(path),
+        time_us=clocks,
+        sensors=np.array(layout.names),
+        q_world_sensor=truth.q_world_sensor,
+        q_world_segment=truth.q_world_segment,
+        t_world_joint=truth.t_world_joint,
+        t_world_tip=truth.t_world_tip,
+        angles=truth.angles,
+    )
