@@ -182,7 +182,12 @@ def _furnish(server: viser.ViserServer) -> None:
         position=(0.0, 0.25, _FLOOR_M),
         shadow_opacity=0.25,
     )
-    server.scene.configure_environment_map("warehouse", environment_intensity=0.35)
+    # dimmer than viser's own light, which bleaches the colours that tell fingers apart
+    server.scene.configure_default_lights(enabled=False)
+    server.scene.configure_environment_map("warehouse", environment_intensity=0.3)
+    server.scene.add_light_directional(
+        "/light", intensity=1.1, position=(-0.3, -0.2, 1.0), cast_shadow=True
+    )
     server.initial_camera.position = (-0.13, 0.02, 0.40)
     server.initial_camera.look_at = (0.0, 0.31, 0.0)
     server.initial_camera.up = (0.0, 0.0, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import warnings
 from contextlib import closing, redirect_stdout
 from io import StringIO
 
@@ -26,6 +27,8 @@ class Server:
     """Draws states on every open page."""
 
     def __init__(self, studio: Studio, port: int) -> None:
+        # a page may close between two lines of ours; what was meant for it needs no mention
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
         with guarded(), redirect_stdout(StringIO()):  # viser's own banner
             self._viser = viser.ViserServer(
                 host=HOST, port=free_port(port), label="handstudio", verbose=False

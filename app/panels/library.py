@@ -16,8 +16,6 @@ from app.words import _
 from handstudio.export.csv import Content
 from handstudio.recording.library import Entry
 
-NO_TAKES = "—"
-
 
 class LibraryPanel:
     """Open a take, export it."""
@@ -26,7 +24,7 @@ class LibraryPanel:
         self._send = send
         self._labels: dict[str, Entry] = {}
         self._entries: tuple[Entry, ...] | None = None
-        self._choice = gui.add_dropdown(_("Take"), (NO_TAKES,))
+        self._choice = gui.add_dropdown(_("Take"), (_("Choose a take"),))
         self._facts = gui.add_markdown("")
         self._recover = gui.add_button(
             _("Recover this recording"), icon=viser.Icon.LIFEBUOY, visible=False
@@ -47,7 +45,7 @@ class LibraryPanel:
         if state.takes is not self._entries:
             self._entries = state.takes
             self._labels = {_label(entry, state.sessions): entry for entry in state.takes}
-            self._choice.options = tuple(self._labels) or (NO_TAKES,)
+            self._choice.options = (_("Choose a take"), *self._labels)
         review = state.review
         self._follow(review.take.path if review else None)
         put(self._csv, visible=review is not None)
@@ -82,9 +80,8 @@ class LibraryPanel:
         if path == self._opened:
             return
         self._opened = path
-        for label, entry in self._labels.items():
-            if entry.path == path:
-                put(self._choice, value=label)
+        shown = [label for label, entry in self._labels.items() if entry.path == path]
+        put(self._choice, value=shown[0] if shown else _("Choose a take"))
 
     def _words(self, state: State) -> str:
         review = state.review

@@ -20,6 +20,7 @@ PLOTS_EVERY = 5  # ticks between two drawings of the plots: about 12 a second
 TEXTS_EVERY = 8
 
 _LEFT_PX = 330.0
+_NARROW_PX = 1200  # a page this narrow has no room for hand and plots at once
 
 
 class Page:
@@ -43,7 +44,8 @@ class Page:
             self._record = RecordPanel(gui, send, state)
         with tabs.add_tab(_("Review"), viser.Icon.TIMELINE):
             self._library = LibraryPanel(gui, send)
-        self._plots = PlotsPanel(gui)
+        self._server = server
+        self._plots: dict[int, PlotsPanel] = {}
         self._transport = TransportPanel(gui, send)
         self._tick = 0
         _add_commands(gui, send, self._library)
@@ -52,10 +54,22 @@ class Page:
         """Bring the page up to date; what changes fast more often than what is read."""
         self._transport.render(state)
         if self._tick % PLOTS_EVERY == 0:
-            self._plots.render(view.curves_of(state))
+            self._render_plots(state)
         if self._tick % TEXTS_EVERY == 0 or state.messages:
             self._render_texts(state)
         self._tick += 1
+
+    def _render_plots(self, state: State) -> None:
+        """Every page has plots of its own, so that a narrow one can begin with them put away."""
+        clients = self._server.get_clients()
+        for gone in self._plots.keys() - clients.keys():
+            del self._plots[gone]
+        curves = view.curves_of(state)
+        for number, client in clients.items():
+            if number not in self._plots:
+                narrow = client.camera.image_width < _NARROW_PX
+                self._plots[number] = PlotsPanel(client.gui, narrow)
+            self._plots[number].render(curves)
 
     def _render_texts(self, state: State) -> None:
         put(self._status, content=view.as_html(view.status_of(state)))

@@ -22,12 +22,14 @@ _GRID: uplot.Axis_Grid = {"stroke": "rgba(128,132,140,0.22)", "width": 1}
 class PlotsPanel:
     """Stacked plots; made anew only when other curves are to be shown."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
+    def __init__(self, gui: viser.GuiApi, narrow: bool) -> None:
         self._gui = gui
         self._panel = gui.add_panel()
         self._tab = self._panel.add_tab(_("Angles"), viser.Icon.CHART_LINE)
         self._panel.dock_right()
         self._panel.set_width(400.0)
+        if narrow:
+            self._panel.minimize()
         with self._tab:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
@@ -70,7 +72,7 @@ class PlotsPanel:
             scales={"x": {"time": False}},
             axes=(
                 {"stroke": _AXIS, "grid": _GRID, "size": 30},
-                {"stroke": _AXIS, "grid": _GRID, "size": 38},
+                {"stroke": _AXIS, "grid": _GRID, "size": 46},
             ),
             legend={"show": False},
             height=_HEIGHT,

@@ -30,7 +30,7 @@ class TransportPanel:
             labels = tuple(f"{speed:g}x" for speed in SPEEDS)
             self._speed = gui.add_dropdown(_("Speed"), labels, initial_value="1x")
             self._live = gui.add_button(_("Back to the live hand"), icon=viser.Icon.HAND_STOP)
-        self._panel.float(x=16.0, y=-16.0, width=440.0, height=236.0)
+        self._panel.float(x=16.0, y=-16.0, width=400.0, height=228.0)
         self._playing = False
         self._time.on_update(
             lambda event: send(intents.Seek(event.target.value)) if event.client else None
