@@ -79,8 +79,7 @@ def log(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3"]:
 
 def angle_between(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[Array, "*b"]:
     """Angle [rad] of the rotation that takes one orientation to the other, in [0, pi]."""
-    angle: Array = np.linalg.norm(log(multiply(conjugate(p), q)), axis=-1)
-    return angle
+    return np.asarray(np.linalg.norm(log(multiply(conjugate(p), q)), axis=-1))
 
 
 def to_matrix(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3 3"]:
@@ -131,7 +130,7 @@ def heading(q: Float[Array, "*b 4"]) -> Float[Array, "*b"]:
     Removing it (``multiply(about_z(-heading(q)), q)``) leaves the inclination part, whose own
     z component is zero.
     """
-    return 2.0 * np.arctan2(q[..., 3], q[..., 0])
+    return np.asarray(2.0 * np.arctan2(q[..., 3], q[..., 0]))
 
 
 def about_z(angle: Float[Array, "*b"] | float) -> Float[Array, "*b 4"]:
