@@ -37,12 +37,15 @@ class Angle:
 def decompose(q_rest_child: Float[Array, "*n 4"]) -> Float[Array, "*n 3"]:
     """Turns [rad] about x, z and y, intrinsic in this order: ``q = Rx(a) Rz(b) Ry(c)``.
 
-    b lies in [-pi/2, pi/2]; a and c are not separately determined where \\|b\\| is pi/2.
+    b lies in [-pi/2, pi/2]; where \\|b\\| is pi/2, a and c are not separately determined, and some
+    pair that composes to the rotation is given.
     """
     m = so3.to_matrix(q_rest_child)
     a = np.arctan2(m[..., 2, 1], m[..., 1, 1])
-    b = np.arcsin(np.clip(-m[..., 0, 1], -1.0, 1.0))
-    c = np.arctan2(m[..., 0, 2], m[..., 0, 0])
+    b = np.arctan2(-m[..., 0, 1], np.hypot(m[..., 1, 1], m[..., 2, 1]))
+    # the last row of what is left, Rz(b) Ry(c), once a is taken off: (-sin c, 0, cos c)
+    left = np.cos(a)[..., None] * m[..., 2, :] - np.sin(a)[..., None] * m[..., 1, :]
+    c = np.arctan2(-left[..., 0], left[..., 2])
     return np.stack([a, b, c], axis=-1)
 
 
