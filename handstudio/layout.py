@@ -14,6 +14,7 @@ from handstudio.errors import LayoutError
 from handstudio.hand.skeleton import JOINTS, SEGMENTS
 
 _REMEDY = "Correct the layout and try again; docs/import.md shows a complete one."
+_SIDES = ("left", "right", "unknown")
 
 
 class SensorPlace(msgspec.Struct, frozen=True):
@@ -75,13 +76,17 @@ class Layout(msgspec.Struct, frozen=True):
         lacking = [name for name in ("forearm", "hand") if name not in self.drivers]
         if lacking:
             return f"No sensor on {' and '.join(lacking)}: no hand is shown."
-        return "The layout names segments that are not a hand's: no hand is shown."
+        return "The layout names segments or joints that are not a hand's: no hand is shown."
 
 
 def check(layout: Layout) -> None:
-    """Raise LayoutError where names repeat, joints make no tree, or a segment hangs in the air."""
+    """Raise LayoutError where names repeat, joints form a loop, or a segment hangs in the air."""
     if not layout.sensors:
         raise LayoutError("The layout has no sensors.", _REMEDY)
+    if layout.side not in _SIDES:
+        raise LayoutError(
+            f"The side of the layout is {layout.side!r}.", 'Write "left", "right" or "unknown".'
+        )
     _refuse_repeats("Sensor", layout.names)
     _refuse_repeats("Joint", [joint.name for joint in layout.joints])
     _refuse_repeats("Child segment", [joint.child for joint in layout.joints])

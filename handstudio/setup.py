@@ -109,18 +109,3 @@ def filter_named(name: str) -> AnyFilter:
 def encode(setup: Setup) -> bytes:
     """JSON, with the same bytes for equal setups."""
     return msgspec.json.encode(setup, order="deterministic")
-
-
-def decode(data: bytes) -> Setup:
-    """Inverse of `encode`.
-
-    Raises:
-        SetupError: these bytes are not a setup this version understands.
-    """
-    try:
-        return msgspec.json.decode(data, type=Setup)
-    except msgspec.MsgspecError as error:
-        raise SetupError(
-            f"The setup stored with this recording cannot be read: {error}.",
-            "Open it with the version of handstudio that recorded it, or update handstudio.",
-        ) from error
