@@ -91,10 +91,10 @@ class Ranges(msgspec.Struct, frozen=True):
         )
 
 
-def from_packets(packets: Iterable[Packet], ranges: Ranges, away_us: int = 0) -> list[Event]:
+def from_packets(packets: Iterable[Packet], ranges: Ranges) -> list[Event]:
     """Turn packets into events; whatever is not motion (replies, health, damage) is left out.
 
-    ``away_us`` is the host time since the last instant, should the device have restarted.
+    How long a device that restarted was away is not in its packets: ``elapsed_us`` stays 0.
     """
     events: list[Event] = []
     run: list[ImuPacket] = []
@@ -107,7 +107,7 @@ def from_packets(packets: Iterable[Packet], ranges: Ranges, away_us: int = 0) ->
                 events.append(Gap(Why.LOST, count))
             case Restart():
                 _close(run, ranges, events)
-                events.append(Gap(Why.RESTART, 0, away_us))
+                events.append(Gap(Why.RESTART, 0))
             case _:
                 pass
     _close(run, ranges, events)

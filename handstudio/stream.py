@@ -6,13 +6,14 @@ import msgspec
 
 from handstudio.errors import SetupError
 from handstudio.protocol.decoder import Decoder, decoder_named
-from handstudio.protocol.packets import ImuPacket, Packet
-from handstudio.samples import Event, Ranges, from_packets
+from handstudio.protocol.packets import Packet
+from handstudio.samples import Event, Gap, ImuSamples, Ranges, Why, from_packets
 
 
 class _Packed(msgspec.Struct):
     decoder: bytes
     last_instant_ns: int | None
+    restarted: bool = False
 
 
 class EventStream:
@@ -28,20 +29,29 @@ class EventStream:
         self.ranges = ranges
         self._decoder: Decoder = decoder_named(decoder)()
         self._last_instant_ns: int | None = None
+        self._restarted = False  # and no instant has come since
 
     def feed(self, chunk: bytes, arrival_ns: int) -> tuple[list[Packet], list[Event]]:
         """Decode a chunk that arrived at host time ``arrival_ns``."""
         packets = self._decoder.feed(chunk)
-        away_ns = arrival_ns - (self._last_instant_ns or arrival_ns)
-        if any(isinstance(packet, ImuPacket) for packet in packets):
-            self._last_instant_ns = arrival_ns
         if self.ranges is None:
             return packets, []
-        return packets, from_packets(packets, self.ranges, away_ns // 1000)
+        events: list[Event] = []
+        for event in from_packets(packets, self.ranges):
+            match event:
+                case Gap(why=Why.RESTART):
+                    self._restarted = True  # told with the next instant: how long is known then
+                case Gap():
+                    events.append(event)
+                case ImuSamples():
+                    events += [*self._restart_before(arrival_ns), event]
+        return packets, events
 
     def save(self) -> bytes:
         """Everything the next chunk's meaning depends on."""
-        return msgspec.msgpack.encode(_Packed(self._decoder.save(), self._last_instant_ns))
+        return msgspec.msgpack.encode(
+            _Packed(self._decoder.save(), self._last_instant_ns, self._restarted)
+        )
 
     @staticmethod
     def resumed(decoder: str, ranges: Ranges | None, saved: bytes) -> EventStream:
@@ -60,4 +70,12 @@ class EventStream:
                 "Process the take from its start instead: handstudio process --from-start.",
             ) from error
         stream._last_instant_ns = got.last_instant_ns
+        stream._restarted = got.restarted
         return stream
+
+    def _restart_before(self, arrival_ns: int) -> list[Event]:
+        """What has to be said before an instant that arrives now."""
+        away_ns = arrival_ns - (self._last_instant_ns or arrival_ns)
+        restart: list[Event] = [Gap(Why.RESTART, 0, away_ns // 1000)] if self._restarted else []
+        self._restarted, self._last_instant_ns = False, arrival_ns
+        return restart
