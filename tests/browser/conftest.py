@@ -1,0 +1,141 @@
+"""A real studio in a process of its own, and a real Chromium that looks at it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+COMMAND = [sys.executable, "-c", "from handstudio.cli import main; main()"]
+
+CHROMIUM_ARGUMENTS = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+
+expect.set_options(timeout=20_000)  # software rendering on two busy cores
+
+
+@dataclass(frozen=True)
+class RunningStudio:
+    """A studio that serves."""
+
+    url: str
+    sessions: Path
+    process: subprocess.Popen[str]
+
+    @property
+    def port(self) -> int:
+        return int(self.url.rsplit(":", 1)[1])
+
+
+Start = Callable[..., RunningStudio]
+
+
+@pytest.fixture
+def start_studio(tmp_path: Path) -> Iterator[Start]:
+    """Start studios; they are ended, and must end well, when the test does."""
+    running: list[RunningStudio] = []
+
+    def start(*arguments: str, sessions: Path | None = None) -> RunningStudio:
+        studio = _start(sessions or tmp_path / "sessions", *arguments)
+        running.append(studio)
+        return studio
+
+    yield start
+    for studio in running:
+        if studio.process.poll() is None:
+            studio.process.send_signal(signal.SIGINT)
+        output, _ = studio.process.communicate(timeout=30)
+        assert studio.process.returncode == 0, output
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=_chromium(), args=CHROMIUM_ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Open pages; one that logs an error fails the test."""
+    errors: list[str] = []
+    contexts = []
+
+    def open_page(studio: RunningStudio, width: int = 1440, height: int = 900) -> Page:
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, accept_downloads=True
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(studio.url)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert errors == []
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def glove(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A virtual glove on TCP, its own process."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "handstudio.device.virtual_glove", "--tcp", str(port), *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def _start(sessions: Path, *arguments: str) -> RunningStudio:
+    command = [*COMMAND, "studio", "--no-browser", "--port", str(free_port())]
+    process = subprocess.Popen(
+        [*command, "--sessions", str(sessions), *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        found = re.search(r"http://localhost:\d+", line)
+        if found:
+            return RunningStudio(found.group(), sessions, process)
+    raise AssertionError("the studio ended before it served")
+
+
+def _chromium() -> str | None:
+    named = os.environ.get("HANDSTUDIO_CHROMIUM")
+    return named or shutil.which("chromium") or shutil.which("google-chrome")

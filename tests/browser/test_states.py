@@ -1,0 +1,131 @@
+"""What the page says when something is missing, wrong, lost or interrupted."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from handstudio.recording.raw_import import import_folder
+from handstudio.recording.simulated import simulate
+from handstudio.recording.take import open_take
+
+from .conftest import Start, free_port, glove
+from .test_loop import button
+
+pytestmark = pytest.mark.browser
+
+
+def test_without_a_device_it_says_what_to_do(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    page = visit(start_studio())
+    expect(page.get_by_text("No device")).to_be_visible()
+    expect(page.get_by_text("Choose one under Device.")).to_be_visible()
+    expect(button(page, "Record")).to_be_disabled()
+    button(page, "Connect").click()  # the virtual glove is always offered
+    expect(page.get_by_text("Live · Virtual glove")).to_be_visible()
+    button(page, "Disconnect").click()
+    expect(page.get_by_text("No device")).to_be_visible()
+
+
+def test_an_address_that_is_none_is_explained(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    page = visit(start_studio("--connect", "serial:/dev/nowhere"))
+    expect(page.get_by_text("Not connected")).to_be_visible()
+    expect(page.get_by_text("there is no such port")).to_be_visible()
+
+
+def test_a_lost_device_is_shown_within_a_second_and_the_take_goes_on(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    port = free_port()
+    with glove(port, "--seed", "3") as first:
+        studio = start_studio("--connect", f"tcp:127.0.0.1:{port}")
+        page = visit(studio)
+        expect(page.get_by_text("Connected")).to_be_visible()
+        button(page, "Record").click()
+        expect(button(page, "Stop")).to_be_visible()
+        page.wait_for_timeout(1500)
+        first.kill()
+        died = time.monotonic()
+        page.get_by_text("Device lost").wait_for(state="visible")
+        assert time.monotonic() - died < 1.5  # a second, and the page's own delay
+        expect(page.get_by_text("The take goes on")).to_be_visible()
+    with glove(port, "--seed", "3"):
+        expect(page.get_by_text("Recording")).to_be_visible()
+        page.wait_for_timeout(1500)
+        button(page, "Stop").click()
+        expect(page.get_by_text("Replay ·")).to_be_visible()
+    takes = list(studio.sessions.glob("*/*/*.mcap"))
+    assert len(takes) == 1
+    summary = open_take(takes[0]).summary
+    assert summary is not None
+    assert summary.duration_s > 3.0
+    assert summary.packets > 200
+
+
+def test_an_interrupted_recording_can_be_had_back(
+    start_studio: Start, visit: Callable[..., Page], tmp_path: Path
+) -> None:
+    take = simulate(tmp_path / "sessions", seconds=6.0, subject="S07", name="broken")
+    cut = take.with_name(take.name + ".recording")
+    cut.write_bytes(take.read_bytes()[: take.stat().st_size // 2])
+    take.unlink()
+    page = visit(start_studio())
+    page.get_by_role("tab", name="Review").click()
+    choose(page, "broken")
+    expect(page.get_by_text("this recording was interrupted")).to_be_visible()
+    button(page, "Recover this recording").click()
+    expect(page.get_by_text("Replay · broken-recovered")).to_be_visible()
+
+
+def test_a_recording_without_a_hand_is_shown_and_says_what_is_missing(
+    start_studio: Start, visit: Callable[..., Page], tmp_path: Path
+) -> None:
+    folder = tmp_path / "hinge"
+    write_hinge(folder)
+    import_folder(folder, tmp_path / "sessions", "rig")
+    page = visit(start_studio())
+    page.get_by_role("tab", name="Review").click()
+    choose(page, "hinge")
+    expect(page.get_by_text("no hand is shown")).to_be_visible()
+    expect(page.get_by_text("Turn across the joint")).to_be_visible()
+
+
+def test_on_a_narrow_page_the_plots_start_put_away(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    studio = start_studio("--virtual")
+    wide, narrow = visit(studio), visit(studio, 1024, 768)
+    expect(wide.get_by_text("MCP flexion")).to_be_visible()
+    expect(narrow.get_by_text("Connected")).to_be_visible()
+    narrow.wait_for_timeout(1500)
+    expect(narrow.get_by_text("MCP flexion")).not_to_be_visible()
+
+
+def choose(page: Page, name: str) -> None:
+    """Pick a take in the list."""
+    page.get_by_role("combobox", name="Take").click()
+    page.get_by_role("option", name=re.compile(name)).first.click()
+
+
+def write_hinge(folder: Path) -> None:
+    """Two sensors across a hinge, the second turning."""
+    folder.mkdir()
+    names = [f"{s}_{k}_{a}" for s in ("A", "B") for k in ("gyr", "acc") for a in "xyz"]
+    rows = [",".join(["time_s", *names])]
+    for i in range(300):
+        turning = 0.5 if i > 100 else 0.0
+        rows.append(f"{i * 0.01:.2f},0,0,0,0,0,9.81,{turning},0,0,0,0,9.81")
+    (folder / "samples.csv").write_text("\n".join(rows), encoding="utf-8")
+    (folder / "layout.toml").write_text(
+        '[sensors]\nA = "upper"\nB = "lower"\n'
+        '[[joints]]\nname = "hinge"\nparent = "upper"\nchild = "lower"\naxes = 1\n',
+        encoding="utf-8",
+    )
