@@ -31,22 +31,21 @@ def skeleton_of(setup: Setup) -> Skeleton:
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    side: HandSide
-    match setup.layout.side:
-        case "left":
-            side = "left"
-        case "right":
-            side = "right"
-        case _:
-            raise LayoutError(
-                "There is no hand in this recording.",
-                setup.layout.missing_for_hand + " Export orientations instead.",
-            )
+    if not setup.layout.is_hand:
+        raise LayoutError(
+            "There is no hand in this recording.",
+            setup.layout.missing_for_hand + " Export orientations instead.",
+        )
+    side: HandSide = "left" if setup.layout.side == "left" else "right"
     return nominal_skeleton(side, setup.hand.hand_length_m)
 
 
 def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Float[Array, "n k 4"]:
-    """Attitude of every segment: by its own sensor, else carried along by its parent at rest."""
+    """Attitude of every segment: by its own sensor, else carried along by its parent at rest.
+
+    Raises:
+        LayoutError: the layout is not a hand's.
+    """
     skeleton = skeleton_of(setup)
     drivers = setup.layout.drivers
     q_sensor_segment = nominal_mounting(setup.layout)
@@ -61,7 +60,11 @@ def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Fl
 
 
 def pose_of(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Pose:
-    """The placed hand."""
+    """The placed hand.
+
+    Raises:
+        LayoutError: the layout is not a hand's.
+    """
     return posed(skeleton_of(setup), segment_attitudes(setup, q_world_sensor))
 
 
@@ -80,10 +83,16 @@ def measured_angles(layout: Layout) -> tuple[Angle, ...]:
 def angles_of(
     setup: Setup, motion: Motion, angles: Sequence[Angle] | None = None
 ) -> Float[Array, "n a"]:
-    """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start."""
+    """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start.
+
+    Raises:
+        LayoutError: the layout is not a hand's.
+    """
     attitudes = segment_attitudes(setup, motion.q_world_sensor)
+    q_sensor_forearm = nominal_mounting(setup.layout)[setup.layout.drivers["forearm"]]
+    start = so3.multiply(motion.q_world_start, q_sensor_forearm)
     wanted = measured_angles(setup.layout) if angles is None else angles
-    return joint_angles(skeleton_of(setup), attitudes, motion.q_world_start, wanted)
+    return joint_angles(skeleton_of(setup), attitudes, start, wanted)
 
 
 def has_start(motion: Motion) -> bool:

@@ -43,7 +43,7 @@ class Motion:
 
     time_us: Int64[Array, " n"]  # device time, continued over restarts of the device
     q_world_sensor: Float[Array, "n s 4"]
-    q_world_start: Float[Array, "n 4"]  # first placed attitude of sensor 0; NaN before
+    q_world_start: Float[Array, "n 4"]  # first placed attitude of the forearm's sensor; NaN before
     doubt: UInt8[Array, "n s"]
 
     def __len__(self) -> int:
@@ -180,7 +180,7 @@ def _place(setup: Setup, state: State, sensor: int, attitude: Array, bias: Array
     placed = state.placed.copy()
     placed[sensor] = True
     start = state.q_world_start
-    if sensor == 0 and not np.isfinite(start).all():
+    if sensor == setup.layout.drivers.get("forearm") and not np.isfinite(start).all():
         start = attitude
     fused = setup.filter.place(state.filter, sensor, attitude, bias)
     return replace(state, filter=fused, placed=placed, q_world_start=start)
@@ -207,8 +207,6 @@ def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> 
     if periods > BRIDGE_S * setup.rate_hz:
         return _unplaced(state, setup.filter.restart(state.filter))
     missing = round(periods) - 1
-    if missing < 1:
-        return state
     share = (np.arange(1, missing + 1) / (missing + 1))[:, None, None]
     first, last = after[:1], state.last
     bridge = ImuSamples(
