@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from handstudio.protocol.codec import Sent, encode, parse, parse_request
-from handstudio.protocol.framing import MAX_FRAME, Frame, Framing, unframe
+from handstudio.protocol.framing import MAX_FRAME, Frame, Framing, frame, unframe
 from handstudio.protocol.packets import (
     Corruption,
     Description,
@@ -110,6 +110,11 @@ def test_counters_of_any_size_wrap_to_32_bits(packet: Sent, sequence: int, clock
         assert read == replace(packet, sequence=sequence % 2**32, clock_us=clock % 2**32)
 
 
+def test_the_totals_of_health_wrap_to_32_bits() -> None:
+    health = Health(1, 2**32 + 2, 2**33 + 3, 5000, (0,))
+    assert parse(payload_of(encode(health))) == Health(1, 2, 3, 5000, (0,))
+
+
 @given(SENT, st.data())
 def test_a_shorter_or_longer_payload_is_refused_for_its_length(
     packet: Sent, data: st.DataObject
@@ -204,13 +209,16 @@ def test_what_does_not_fit_the_wire_is_not_sent(about: Description) -> None:
         {"gyroscope_range_dps": 0.0},
         {"magnetometer_range_ut": float("nan")},
         {"accelerometer_range_g": 1e300},
+        {"accelerometer_range_g": float("inf")},
+        {"magnetometer_range_ut": -1.0},
     ):
         with pytest.raises(ValueError, match=r"\w"):
             encode(replace(about, **changes))
     for packet in (
         Health(0, 0, 0, 70_000, (0,)),
         Health(0, 0, 0, 0, (65_536,)),
-        Temperature(0, np.array([400.0])),
+        Temperature(0, np.array([327.68])),
+        Temperature(0, np.array([-327.68])),
         Temperature(0, np.array([np.inf])),
         Reply(0x80, 256, 0, ""),
         Request(0x7F, 0),
@@ -218,6 +226,12 @@ def test_what_does_not_fit_the_wire_is_not_sent(about: Description) -> None:
     ):
         with pytest.raises(ValueError, match=r"\w"):
             encode(packet)
+
+
+def test_no_payload_is_framed_that_no_reader_would_take() -> None:
+    assert len(frame(bytes(range(1, 254)) * 4)) <= MAX_FRAME
+    with pytest.raises(ValueError, match="does not fit a frame of 1024"):
+        frame(bytes(1020))
 
 
 @pytest.mark.parametrize("length", [*range(5), 249, 250, 251, 253, 254, 255, 504, 505])

@@ -136,6 +136,7 @@ def test_save_and_restore_between_any_two_bytes_change_nothing(
         b"[" * 100_000,
         b"{}",
         b'{"decoder":"lines"}',
+        b'{"decoder":' + b"[" * 200_000,
         b'{"decoder":"handstudio-1","layout":2,"framing":{},"continuity":{}}',
         b'{"decoder":"handstudio-1","layout":1,"framing":{"pending":7},"continuity":{}}',
         b'{"decoder":"handstudio-1","layout":1,"framing":{},"continuity":{"last":{"sequence":1}}}',
@@ -258,9 +259,9 @@ def test_one_absurd_clock_or_sequence_is_survived(instant: Instant) -> None:
 
 def test_a_long_rest_is_bridged_by_the_clock_of_health(instant: Instant) -> None:
     """Two hours between STOP and START: more than the clock's wrap."""
-    hours = [Health(k * 1_000_000, 10, 0, 0, (0, 0, 0)) for k in range(1, 7200)]
+    minutes = [Health(k * 60_000_000, 10, 0, 0, (0, 0, 0)) for k in range(1, 120)]
     last = instant(11, clock_us=7_200_000_000)
-    assert decoded(instant(10), *hours, last) == [instant(10), *hours, last]
+    assert decoded(instant(10), *minutes, last) == [instant(10), *minutes, last]
 
 
 def test_a_health_built_before_an_instant_and_sent_after_it_keeps_its_time(
@@ -280,6 +281,21 @@ def test_a_packet_of_more_sensors_than_described_is_refused(
     assert read == [about, instant(1), *refused, instant(2)]
 
 
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"\x06", Reason.UNKNOWN_TYPE),
+        (b"\x05\x80\x01\x00", Reason.LENGTH),
+        (b"\x05\x80\x01\x00\x01\xff", Reason.CONTENT),
+    ],
+)
+def test_a_good_frame_of_a_bad_packet_is_told_from_the_very_first(
+    payload: bytes, reason: Reason
+) -> None:
+    wire = frame(payload)
+    assert V1Decoder().feed(wire + wire) == [Corruption(reason, len(wire))] * 2
+
+
 def test_another_version_is_named_and_nothing_else_of_its_frame(instant: Instant) -> None:
     foreign = frame(b"\x01\x02" + bytes(range(40)))
     decoder = V1Decoder()
@@ -291,7 +307,7 @@ def test_another_version_is_named_and_nothing_else_of_its_frame(instant: Instant
 def test_decoders_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     offered = EntryPoints(
         [
-            EntryPoint("theirs", f"{__name__}:Theirs", "handstudio.decoders"),
+            EntryPoint("theirs", "handstudio.protocol.decoder:Theirs", "handstudio.decoders"),
             EntryPoint("broken", "nowhere.to.be.found:Decoder", "handstudio.decoders"),
             EntryPoint("v1", "handstudio.protocol.decoder:V1Decoder", "handstudio.decoders"),
         ]
@@ -301,6 +317,8 @@ def test_decoders_are_found_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     assert decoder_named("v1") is V1Decoder
     with pytest.raises(SetupError, match=r"broken.*nowhere"):
         decoder_named("broken")
+    with pytest.raises(SetupError, match=r"theirs.*Theirs"):
+        decoder_named("theirs")
     with pytest.raises(SetupError, match="known are broken, handstudio-1, theirs, v1"):
         decoder_named("unheard-of")
 
