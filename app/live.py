@@ -45,7 +45,7 @@ def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion
     return replace(
         history,
         start_us=start,
-        next_us=int(kept.time_us[-1]) + _STEP_US,
+        next_us=(int(kept.time_us[-1]) // _STEP_US + 1) * _STEP_US,
         time_s=time_s[recent],
         values=values[recent],
     )
