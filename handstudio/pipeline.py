@@ -75,7 +75,7 @@ def begin(setup: Setup) -> State:
     """State before the first event."""
     sensors = len(setup.layout.sensors)
     return State(
-        filter=setup.filter.begin(sensors, setup.rate_hz),
+        filter=setup.filter.begin(sensors, setup.rate_hz, setup.magnetometer_rate_hz),
         placed=np.zeros(sensors, dtype=bool),
         q_world_start=np.full(4, np.nan),
         recent=_nothing(sensors),

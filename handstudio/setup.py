@@ -42,6 +42,7 @@ class Setup(msgspec.Struct, frozen=True):
     Attributes:
         layout: Sensors and joints.
         rate_hz: Nominal sampling rate.
+        magnetometer_rate_hz: How often magnetometers read anew; None: with every sample, or never.
         ranges: What the device's counts stand for; None for imports, which are in SI.
         decoder: Name of the decoder of the recorded bytes; None for imports.
         filter: Which filter, with its parameters.
@@ -53,6 +54,7 @@ class Setup(msgspec.Struct, frozen=True):
 
     layout: Layout
     rate_hz: float
+    magnetometer_rate_hz: float | None = None
     ranges: Ranges | None = None
     decoder: str | None = None
     filter: AnyFilter = VqfFilter()
@@ -83,6 +85,7 @@ def for_device(
     return Setup(
         layout=glove(known, names),
         rate_hz=float(description.rate_hz),
+        magnetometer_rate_hz=float(description.magnetometer_rate_hz) or None,
         ranges=Ranges.of(description),
         decoder=decoder,
         hand=hand or HandModel(),

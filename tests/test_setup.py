@@ -37,12 +37,17 @@ def test_a_device_that_described_itself_is_set_up():
     setup = for_device(ABOUT, "handstudio-1", HandModel(hand_length_m=0.17))
     assert setup.layout.names == ("SN1", "SN11", "Tip")
     assert setup.layout.side == "left"
-    assert setup.rate_hz == 500.0
+    assert (setup.rate_hz, setup.magnetometer_rate_hz) == (500.0, 100.0)
     assert setup.decoder == "handstudio-1"
     assert setup.hand.hand_length_m == 0.17
     assert setup.ranges.acc == 8.0 * STANDARD_GRAVITY
     assert setup.ranges.gyr == pytest.approx(np.deg2rad(1000.0))
     assert (setup.device.name, setup.device.serial_number) == ("手袋", "42")
+
+
+def test_a_device_without_magnetometers_has_no_rate_of_them():
+    blind = replace(ABOUT, magnetometer_rate_hz=0, magnetometer_range_ut=0.0)
+    assert for_device(blind, "handstudio-1").magnetometer_rate_hz is None
 
 
 @pytest.mark.parametrize(
@@ -77,6 +82,7 @@ def test_the_key_tells_every_change_and_nothing_else():
     other = {
         "layout": glove("left"),
         "rate_hz": 501.0,
+        "magnetometer_rate_hz": 50.0,
         "ranges": None,
         "decoder": None,
         "filter": VqfFilter(tau_acc_s=3.1),

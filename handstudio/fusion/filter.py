@@ -21,8 +21,13 @@ State = TypeVar("State")
 class Filter(Protocol[State]):
     """A fusion filter over all sensors of a layout."""
 
-    def begin(self, sensors: int, rate_hz: float) -> State:
-        """State before the first sample: attitude from whatever the first sample says."""
+    def begin(
+        self, sensors: int, rate_hz: float, magnetometer_rate_hz: float | None = None
+    ) -> State:
+        """State before the first sample: attitude from whatever the first sample says.
+
+        ``magnetometer_rate_hz`` is how often fresh readings come; None: with every sample.
+        """
         ...
 
     def restart(self, state: State) -> State:

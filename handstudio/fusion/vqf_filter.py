@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 import numpy as np
@@ -32,14 +32,16 @@ class VqfState:
     """State of all sensors."""
 
     period_s: float
+    magnetometer_period_s: float  # VQF weighs a fresh reading by the time it stands for
     sensors: tuple[SensorState, ...]
     gyr_bias: Float[Array, "s 3"]  # found at rest, taken off before VQF, which clips at 2 deg/s
     q_enu_sensor: Float[Array, "s 4"]  # the newest output, held while a sensor is silent
 
 
 class _Packed(msgspec.Struct):
-    kind: str
+    kind: Literal["vqf"]
     period_s: float
+    magnetometer_period_s: float
     sensors: list[dict[str, Any]]
     gyr_bias: list[list[float]]
     q_enu_sensor: list[list[float]]
@@ -58,12 +60,16 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
     tau_mag_s: float = 9.0
     use_magnetometer: bool = True
 
-    def begin(self, sensors: int, rate_hz: float) -> VqfState:
+    def begin(
+        self, sensors: int, rate_hz: float, magnetometer_rate_hz: float | None = None
+    ) -> VqfState:
         """State before the first sample."""
         period = 1.0 / rate_hz
-        fresh = self._instance(period).state
+        magnetometer_period = 1.0 / min(rate_hz, magnetometer_rate_hz or rate_hz)
+        fresh = self._instance(period, magnetometer_period).state
         return VqfState(
             period,
+            magnetometer_period,
             (fresh,) * sensors,
             np.zeros((sensors, 3)),
             np.tile(so3.IDENTITY, (sensors, 1)),
@@ -71,7 +77,7 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
 
     def restart(self, state: VqfState) -> VqfState:
         """Forget attitudes, keep biases."""
-        fresh = self._instance(state.period_s).state
+        fresh = self._instance_of(state).state
         return replace(state, sensors=(fresh,) * len(state.sensors))
 
     def place(
@@ -83,14 +89,14 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
     ) -> VqfState:
         """Set a sensor's attitude and bias, as found at rest."""
         q_enu_sensor = so3.multiply(so3.conjugate(_Q_WORLD_ENU), q_world_sensor)
-        placed = dict(self._instance(state.period_s).state)
+        placed = dict(self._instance_of(state).state)
         placed["gyrQuat"] = q_enu_sensor.tolist()
         placed["kMagInit"] = 0.0  # else the first compass reading would replace this heading
         sensors = list(state.sensors)
         sensors[sensor] = placed
         biases, newest = state.gyr_bias.copy(), state.q_enu_sensor.copy()
         biases[sensor], newest[sensor] = gyr_bias, q_enu_sensor
-        return VqfState(state.period_s, tuple(sensors), biases, newest)
+        return replace(state, sensors=tuple(sensors), gyr_bias=biases, q_enu_sensor=newest)
 
     def run(
         self,
@@ -105,7 +111,7 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
         fresh = samples.fresh & self.use_magnetometer & np.isfinite(samples.mag).all(axis=-1)
         out = np.empty((*gyr.shape[:2], 4))
         after = []
-        vqf = self._instance(state.period_s)
+        vqf = self._instance_of(state)
         for i, sensor in enumerate(state.sensors):
             vqf.state = sensor
             use = heeded[:, i]
@@ -122,6 +128,7 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
             _Packed(
                 "vqf",
                 state.period_s,
+                state.magnetometer_period_s,
                 [dict(sensor) for sensor in state.sensors],
                 state.gyr_bias.tolist(),
                 state.q_enu_sensor.tolist(),
@@ -139,13 +146,19 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
             ) from error
         return VqfState(
             got.period_s,
+            got.magnetometer_period_s,
             tuple(got.sensors),
             np.array(got.gyr_bias).reshape(-1, 3),
             np.array(got.q_enu_sensor).reshape(-1, 4),
         )
 
-    def _instance(self, period_s: float) -> VQF:
-        return VQF(period_s, tauAcc=self.tau_acc_s, tauMag=self.tau_mag_s)
+    def _instance_of(self, state: VqfState) -> VQF:
+        return self._instance(state.period_s, state.magnetometer_period_s)
+
+    def _instance(self, period_s: float, magnetometer_period_s: float) -> VQF:
+        return VQF(
+            period_s, magTs=magnetometer_period_s, tauAcc=self.tau_acc_s, tauMag=self.tau_mag_s
+        )
 
 
 def _hold(out: Array, use: Array, fused: Array, held: Array) -> None:

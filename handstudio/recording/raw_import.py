@@ -39,6 +39,7 @@ class Folder:
     samples: ImuSamples
     layout: Layout
     rate_hz: float
+    magnetometer_rate_hz: float | None
     labels: tuple[Label, ...]
     reference: Reference | None
 
@@ -63,7 +64,8 @@ def import_folder(
     now = datetime.now(UTC)
     path = new_take_path(sessions, subject, name or folder.resolve().name, now)
     start_ns = int(now.timestamp() * 1e9)
-    setup = Setup(content.layout, content.rate_hz, hand=hand or HandModel())
+    rates = content.rate_hz, content.magnetometer_rate_hz
+    setup = Setup(content.layout, *rates, hand=hand or HandModel())
     header = Header(path.stem, subject, start_ns, setup, "samples", folder.resolve().name)
     writer = TakeWriter(path, header)
     try:
@@ -104,7 +106,15 @@ def read_folder(folder: Path) -> Folder:
         saturated=np.zeros(shape, dtype=bool),
     )
     rate = 1e6 / float(np.median(np.diff(time_us)))
-    return Folder(samples, layout, rate, _labels(folder), _reference(folder, layout))
+    magnetometer_rate = rate * _typical_share(fresh)
+    return Folder(
+        samples,
+        layout,
+        rate,
+        magnetometer_rate or None,
+        _labels(folder),
+        _reference(folder, layout),
+    )
 
 
 def _table(folder: Path, stem: str) -> pa.Table | None:
@@ -184,6 +194,12 @@ def _signal(table: pa.Table, layout: Layout, kind: str) -> Array:
                 _refuse_nan(values[:, axis], name, "samples")
         columns.append(values)
     return np.stack(columns, axis=1)
+
+
+def _typical_share(fresh: Array) -> float:
+    """Share of instants with a fresh reading, of the sensors that have a magnetometer at all."""
+    shares = fresh.mean(axis=0)
+    return float(np.median(shares[shares > 0.0])) if shares.any() else 0.0
 
 
 def _column(table: pa.Table, name: str, file: str) -> Array:
