@@ -9,7 +9,7 @@ import webbrowser
 from pathlib import Path
 from types import FrameType
 
-from app import intents, words
+from app import intents
 from app.jobs import Jobs
 from app.server import Server
 from app.studio import State, Studio
@@ -21,7 +21,6 @@ TICK_S = 1.0 / 60.0
 
 def run(sessions: Path, *, address: str | None, port: int, browser: bool) -> int:
     """Serve the studio until Ctrl-C; ends a take that is on, so that nothing is lost."""
-    words.use_language("en")
     ended = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 import tyro
@@ -45,6 +45,7 @@ def studio(
     port: int = 8765,
     sessions: Sessions = None,
     browser: bool = True,
+    language: Literal["en", "ja"] | None = None,
 ) -> int:
     """Open the studio in the browser.
 
@@ -54,10 +55,13 @@ def studio(
         port: Port of the page; the next free one is taken where this is in use.
         sessions: Folder of the takes.
         browser: Open the page in the browser.
+        language: English or Japanese; the system's unless given.
     """
-    from app.__main__ import run  # noqa: PLC0415 - the page's libraries only where it is wanted
+    from app import words  # noqa: PLC0415 - the page's libraries only where it is wanted
+    from app.__main__ import run  # noqa: PLC0415
 
     address = connect or ("virtual:" if virtual else None)
+    words.use_language(language)
     return run(library.sessions_folder(sessions), address=address, port=port, browser=browser)
 
 

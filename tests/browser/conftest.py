@@ -121,7 +121,7 @@ def glove(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 
 def _start(sessions: Path, *arguments: str) -> RunningStudio:
-    command = [*COMMAND, "studio", "--no-browser", "--port", str(free_port())]
+    command = [*COMMAND, "studio", "--language", "en", "--no-browser", "--port", str(free_port())]
     process = subprocess.Popen(
         [*command, "--sessions", str(sessions), *arguments],
         stdout=subprocess.PIPE,
