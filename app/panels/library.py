@@ -91,12 +91,14 @@ class LibraryPanel:
                 return entry.problem + "\n\n" + _("What was saved can be had back.")
             return "" if self._labels else _("No takes yet: record one.")
         header, summary = review.take.header, review.take.summary
-        lost = f", {_('lost')} {summary.missing}" if summary else ""
         start = datetime.fromtimestamp(header.start_utc_ns * 1e-9).astimezone()
+        counts = _("{instants} instants, {lost} lost").format(
+            instants=len(review.time_s), lost=summary.missing if summary else "?"
+        )
+        zero = _("Zero of angles: {zero}").format(zero=header.setup.zero)
         return (
             f"**{header.name}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
-            f"{clock_of(review.duration_s)} · {len(review.time_s)} {_('instants')}{lost}\n\n"
-            f"{_('Zero')}: {header.setup.zero}"
+            f"{clock_of(review.duration_s)} · {counts}\n\n{zero}"
         )
 
 
