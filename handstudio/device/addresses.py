@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 from handstudio.device.replay_source import ReplaySource
 from handstudio.device.serial_source import SerialSource
@@ -27,18 +27,19 @@ def open_source(address: str) -> ByteSource:
     Raises:
         DeviceError: it is no address, or cannot be opened; says what to do.
     """
-    scheme, _, rest = address.partition(":")
+    scheme, _, place = address.partition(":")
     match scheme:
-        case "serial":
-            return SerialSource(rest)
-        case "tcp":
-            return TcpSource(rest)
-        case "virtual":
-            return VirtualSource(dict(parse_qsl(urlsplit(address).query)))
-        case "replay":
-            return ReplaySource(Path(rest))
+        case "serial" if place:
+            return SerialSource(place)
+        case "tcp" if place:
+            return TcpSource(place)
+        case "virtual" if place == "" or place.startswith("?"):
+            return VirtualSource(dict(parse_qsl(place[1:])))
+        case "replay" if place:
+            return ReplaySource(Path(place))
         case _:
             raise DeviceError(
                 f"{address!r} is not the address of a device.",
-                "Write serial:PORT, tcp:HOST:PORT, virtual: or replay:FILE.",
+                "Write serial:PORT, tcp:HOST:PORT, virtual: (or virtual:?rate=1000) or "
+                "replay:FILE.",
             )

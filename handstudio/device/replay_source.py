@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from handstudio.device.source import SourceLost
-from handstudio.errors import DeviceError
+from handstudio.errors import DeviceError, TakeError
 from handstudio.protocol.codec import encode
-from handstudio.protocol.packets import TIP_SENSOR, Description
+from handstudio.protocol.decoder import V1Decoder
+from handstudio.protocol.packets import TIP_SENSOR, Description, ImuPacket
 from handstudio.recording.take import Take, open_take
 from handstudio.samples import STANDARD_GRAVITY
 
@@ -40,7 +42,7 @@ class ReplaySource:
             time.sleep(timeout_s)
             return b""
         time.sleep(max(0.0, wait_s))
-        self._next = next(self._chunks, None)
+        self._next = self._following()
         if self._shift_ns is None and self._next is not None:
             self._shift_ns = _now() - self._next[0]
         return chunk
@@ -49,7 +51,14 @@ class ReplaySource:
         """A recording cannot be asked for anything."""
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Let go."""
+        self._chunks, self._next = iter(()), None
+
+    def _following(self) -> tuple[int, bytes] | None:
+        try:
+            return next(self._chunks, None)
+        except TakeError as error:  # only reading on shows that a take is damaged
+            raise SourceLost(error.what) from error
 
 
 def _now() -> int:
@@ -65,7 +74,7 @@ def _description(take: Take) -> Description:
     side = setup.layout.side
     return Description(
         protocol=device.protocol,
-        epoch=0,
+        epoch=secrets.randbits(24) << 8 | _epoch_low(take),
         name=device.name,
         serial_number=device.serial_number,
         firmware=device.firmware,
@@ -78,3 +87,13 @@ def _description(take: Take) -> Description:
         gyroscope_range_dps=float(np.rad2deg(ranges.gyr)),
         magnetometer_range_ut=ranges.mag,
     )
+
+
+def _epoch_low(take: Take) -> int:
+    """What the packets of the take repeat: the rest of an epoch is one of each replay's own."""
+    decoder = V1Decoder()
+    for _, chunk in take.chunks():
+        for packet in decoder.feed(chunk):
+            if isinstance(packet, ImuPacket):
+                return packet.epoch
+    return 0

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import select
+import sys
 
 import serial
 
 from handstudio.device.source import SourceLost
 from handstudio.errors import DeviceError
+
+if sys.platform == "win32":
+    _FAILURES: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError)
+else:
+    import termios
+
+    # a port that vanishes while it is opened fails in ways that pyserial passes on as they are
+    _FAILURES = (serial.SerialException, OSError, ValueError, termios.error)
 
 
 class SerialSource:
@@ -19,7 +28,7 @@ class SerialSource:
             self._port = serial.Serial(
                 port, baudrate=1_000_000, timeout=0, write_timeout=1.0, exclusive=_exclusive()
             )
-        except (serial.SerialException, OSError, ValueError) as error:
+        except _FAILURES as error:
             raise _cannot_open(port, error) from error
 
     def read(self, timeout_s: float) -> bytes:
@@ -28,19 +37,19 @@ class SerialSource:
             self._wait(timeout_s)
             waiting = self._port.in_waiting
             return bytes(self._port.read(max(1, waiting)))
-        except (serial.SerialException, OSError, TypeError) as error:
+        except (*_FAILURES, TypeError) as error:
             raise SourceLost(str(error)) from error
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
         try:
             self._port.write(data)
-        except (serial.SerialException, OSError) as error:
+        except _FAILURES as error:
             raise SourceLost(str(error)) from error
 
     def close(self) -> None:
         """Let go."""
-        with contextlib.suppress(serial.SerialException, OSError):
+        with contextlib.suppress(*_FAILURES):
             self._port.close()
 
     def _wait(self, timeout_s: float) -> None:
@@ -66,6 +75,6 @@ def _cannot_open(port: str, error: Exception) -> DeviceError:
         return DeviceError(
             f"{port}: another program has this port open.", "Close that program, then connect."
         )
-    if "No such file" in text or "could not open port" in text or "FileNotFound" in text:
+    if "No such file" in text or "No such device" in text or "FileNotFound" in text:
         return DeviceError(f"{port}: there is no such port.", "Plug the device in, or look for it.")
     return DeviceError(f"{port}: cannot be opened ({text}).", "Unplug the device and plug it in.")

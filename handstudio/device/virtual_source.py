@@ -80,9 +80,20 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
     for option in _OPTIONS:
         if option in options:
             command += [f"--{option}", options[option]]
-    return subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
-    )
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            start_new_session=True,  # Ctrl-C in the terminal is for us: the glove ends with us
+        )
+    except OSError as error:
+        raise DeviceError(
+            f"The virtual glove cannot be started: {command[0]} ({error.strerror or error}).",
+            "Install handstudio anew: its Python has gone.",
+        ) from error
 
 
 def _line(address: str) -> ByteSource:
