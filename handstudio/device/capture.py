@@ -21,6 +21,7 @@ from handstudio import pipeline
 from handstudio.device.addresses import open_source
 from handstudio.device.health import HealthCount
 from handstudio.device.host_clock import now_ns
+from handstudio.device.line import READ_S, Line
 from handstudio.device.orders import (
     Ask,
     Connect,
@@ -35,45 +36,31 @@ from handstudio.device.orders import (
     TakeDone,
 )
 from handstudio.device.recorder import Recorder
-from handstudio.device.source import ByteSource, SourceLost
+from handstudio.device.source import SourceLost
 from handstudio.errors import DeviceError, HandstudioError
 from handstudio.pipeline import Motion
-from handstudio.protocol.codec import encode
 from handstudio.protocol.packets import (
     Command,
     Description,
     ForeignVersion,
     Packet,
     Reply,
-    Request,
+    Restart,
 )
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.take import FirstState, pack_first_state
 from handstudio.samples import Ranges
-from handstudio.setup import HandModel, for_device
+from handstudio.setup import HandModel, Setup, for_device
 from handstudio.stream import EventStream
 
 T = TypeVar("T")
 
-READ_S = 0.02  # how long a read waits for the first byte, and so how soon a request is heard
-SILENCE_S = 0.5  # without a byte for so long a streaming device counts as lost
-REOPEN_S = 2.0  # a silent line is opened anew after this
+SILENCE_S = 0.5  # without motion for so long a streaming device counts as lost
+REOPEN_S = 2.0  # a line without a byte is opened anew after this
 RETRY_S = 0.25  # between attempts to reach a lost device
 INTRODUCTION_S = 4.0  # a device that has not described itself by then is not one of ours
-ASK_S = 0.5  # between two questions for a description
+HEALTH_S = 0.1  # between two times the figures are renewed: they cost as much as a filter step
 HISTORY = 2000  # motions kept for `drain`
-
-
-@dataclass
-class _Line:
-    """The open line and what happened on it."""
-
-    source: ByteSource
-    opened: float
-    asked: float = 0.0
-    heard: float = 0.0  # last byte
-    received: int = 0
-    introduced: bool = False
 
 
 @dataclass
@@ -95,12 +82,12 @@ class Capture:
         self._reports: deque[Report] = deque(maxlen=100)
         self._closing: list[Recorder] = []
         self._wanted: _Wanted | None = None
-        self._line: _Line | None = None
+        self._line: Line | None = None
         self._stream = EventStream("handstudio-1", None)
         self._state: pipeline.State | None = None
         self._count = HealthCount()
         self._at_start = HealthCount()  # counts when the take began
-        self._tag = 0
+        self._health_due = 0.0
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
 
     # --- doors, for any thread ------------------------------------------------------------------
@@ -134,7 +121,7 @@ class Capture:
             while self._obey():
                 self._work()
         except Exception as error:  # a thread must not die unseen
-            self._fail(
+            self._give_up(
                 HandstudioError(
                     f"The capture stopped: {type(error).__name__}: {error}.",
                     "Restart the studio and report this; the take was closed.",
@@ -161,16 +148,10 @@ class Capture:
     def _follow(self, order: Order) -> None:
         match order:
             case Connect():
-                self._stop_take()
-                self._close()
-                self._stream = EventStream(order.decoder, None)
-                self._state, self._count = None, HealthCount()
-                self._wanted = _Wanted(order)
-                self.newest = Newest(Phase.CONNECTING, order.address)
+                self._let_go()
+                self._connect(order)
             case Disconnect():
-                self._stop_take()
-                self._close()
-                self._wanted = None
+                self._let_go()
                 self.newest = Newest()
             case SetHand(hand=hand):
                 self._set_hand(hand)
@@ -178,8 +159,36 @@ class Capture:
                 self._start_take(order)
             case StopTake():
                 self._stop_take()
-            case Ask(command=command, argument=argument):
-                self._ask(command, argument)
+            case Ask():
+                self._pass_on(order)
+
+    def _let_go(self) -> None:
+        self._stop_take()
+        self._close()
+        self._wanted = None
+
+    def _connect(self, order: Connect) -> None:
+        self.newest = Newest(Phase.CONNECTING, order.address)
+        self._state, self._count = None, HealthCount()
+        try:
+            self._stream = EventStream(order.decoder, None)
+        except HandstudioError as error:
+            self._fail(error)
+            return
+        self._wanted = _Wanted(order)
+
+    def _pass_on(self, order: Ask) -> None:
+        if order.command == Command.SET_RATE and self.newest.recorder is not None:
+            self._reports.append(
+                DeviceError("The rate stays while a take is recorded.", "Stop the take first.")
+            )
+            return
+        try:
+            self._ask(order.command, order.argument)
+        except ValueError as error:
+            self._reports.append(
+                DeviceError(f"No such command can be sent: {error}.", "Correct the command.")
+            )
 
     def _work(self) -> None:
         if self._line is not None:
@@ -199,35 +208,46 @@ class Capture:
                 self._wanted = None
                 self._fail(error)
             return
-        now = time.monotonic()
-        self._line = _Line(source, opened=now, heard=now)
+        self._line = Line(source, wanted.order.decoder)
 
-    def _listen(self, line: _Line) -> None:
+    def _listen(self, line: Line) -> None:
         try:
-            self._introduce(line)
-            chunk = line.source.read(READ_S)
+            chunk = line.read()
         except SourceLost:
             self._lose()
             return
-        if chunk:
-            line.heard = time.monotonic()
-            line.received += len(chunk)
+        if chunk and line.introduced:
             self._take_in(chunk, now_ns(), line)
-        else:
-            self._notice_silence(line)
+        elif chunk:
+            self._find_out(chunk, now_ns(), line)
+        if line is self._line:
+            self._keep_asking(line)
 
-    def _introduce(self, line: _Line) -> None:
-        """Ask who is there until it says so; give up on a line that never does."""
+    def _keep_asking(self, line: Line) -> None:
+        """Ask who is there until it says so, and for motion until it comes; give up at last."""
         now = time.monotonic()
-        if line.introduced or now - line.asked < ASK_S:
-            return
-        if now - line.opened > INTRODUCTION_S and self._wanted and not self._wanted.was_there:
+        streaming = self.newest.phase is Phase.STREAMING
+        if streaming and now - line.moved > self._patience_s:
+            self._show_lost()
+        if line.introduced:
+            if now - line.heard > REOPEN_S:
+                self._lose()
+            elif now - line.moved > self._patience_s:
+                self._ask_again(Command.START)
+        elif now - line.opened <= INTRODUCTION_S:
+            self._ask_again(Command.DESCRIBE)
+        elif self._wanted and self._wanted.was_there:
+            self._lose()
+        else:
             self._refuse(line)
-            return
-        line.asked = now
-        self._ask(Command.DESCRIBE)
 
-    def _refuse(self, line: _Line) -> None:
+    @property
+    def _patience_s(self) -> float:
+        """How long a device may be still before it counts as lost: three of its periods."""
+        setup = self.newest.setup
+        return SILENCE_S if setup is None else max(SILENCE_S, 3.0 / setup.rate_hz)
+
+    def _refuse(self, line: Line) -> None:
         heard = "nothing came" if line.received == 0 else f"{line.received} bytes came"
         self._give_up(
             DeviceError(
@@ -238,35 +258,54 @@ class Capture:
             )
         )
 
-    def _take_in(self, chunk: bytes, arrival_ns: int, line: _Line) -> None:
+    def _find_out(self, chunk: bytes, arrival_ns: int, line: Line) -> None:
+        """Nothing enters a take or the pipeline before it is known from whom it is."""
+        for packet in line.hold(arrival_ns, chunk):
+            if isinstance(packet, Description | ForeignVersion):
+                self._heed(packet, line)
+            if line is not self._line:
+                return
+        if line.introduced:
+            for held_ns, held in line.release():
+                self._take_in(held, held_ns, line)
+
+    def _take_in(self, chunk: bytes, arrival_ns: int, line: Line) -> None:
+        """Record, decode and fuse: all three or none, so that `process` gives the same motion."""
+        if line is not self._line:
+            return
         recorder = self.newest.recorder
         if recorder is not None:
             recorder.put(arrival_ns, chunk)
         packets, events = self._stream.feed(chunk, arrival_ns)
         self._count.note(packets, arrival_ns)
+        if self.newest.setup is not None and self._state is not None:
+            motion, self._state = pipeline.run(self.newest.setup, self._state, events)
+            if len(motion):
+                self._publish(motion, arrival_ns, line)
         for packet in packets:
             self._heed(packet, line)
-        setup = self.newest.setup
-        if setup is None or self._state is None or self._line is None:
-            return
-        motion, self._state = pipeline.run(setup, self._state, events)
-        if len(motion) == 0:
-            return
-        if recorder is not None:
-            recorder.put_motion(motion)
+
+    def _publish(self, motion: Motion, arrival_ns: int, line: Line) -> None:
+        line.moved = time.monotonic()
+        if self.newest.recorder is not None:
+            self.newest.recorder.put_motion(motion)
         self._history.append(motion)
         published = now_ns()
         self._count.note_latency((published - arrival_ns) * 1e-6)
+        health = self.newest.health
+        if line.moved >= self._health_due:
+            health = self._count.view(published)
+            self._health_due = line.moved + HEALTH_S
         self.newest = replace(
-            self.newest,
-            phase=Phase.STREAMING,
-            motion=motion[-1:],
-            health=self._count.view(published),
-            problem=None,
+            self.newest, phase=Phase.STREAMING, motion=motion[-1:], health=health, problem=None
         )
 
-    def _heed(self, packet: Packet, line: _Line) -> None:
+    def _heed(self, packet: Packet, line: Line) -> None:
+        if line is not self._line:
+            return  # something before it made us hang up
         match packet:
+            case Restart():
+                line.forget()
             case Description():
                 self._meet(packet, line)
             case ForeignVersion(version=version):
@@ -282,15 +321,19 @@ class Capture:
             case _:
                 pass
 
-    def _meet(self, description: Description, line: _Line) -> None:
+    def _meet(self, description: Description, line: Line) -> None:
         """A device described itself: the first one, the same again, or another."""
         wanted = self._wanted
         if wanted is None:
             return
         order = wanted.order
-        setup = for_device(description, order.decoder, order.hand, order.side)
+        try:
+            setup = for_device(description, order.decoder, order.hand, order.side)
+        except HandstudioError as error:
+            self._give_up(error)
+            return
         if self.newest.recorder is not None and setup != self.newest.setup:
-            self._put_off(description)
+            self._put_off(setup)
             return
         first = not line.introduced
         line.introduced = wanted.was_there = True
@@ -300,38 +343,27 @@ class Capture:
             self._history.clear()
         self.newest = replace(self.newest, description=description, setup=setup, problem=None)
         if first:
+            line.moved = time.monotonic()
             self._ask(Command.START)
 
-    def _put_off(self, description: Description) -> None:
+    def _put_off(self, other: Setup) -> None:
         """Another device, or other settings, in the middle of a take: not into the same file."""
-        setup = self.newest.setup
-        mine = setup.device.serial_number if setup and setup.device else "the one before"
-        problem = DeviceError(
-            f"Another device answers ({description.serial_number}, not {mine}), or its settings "
-            "changed; the take waits.",
-            f"Plug {mine} back in, or stop the take.",
-        )
+        mine, theirs = _serial_number(self.newest.setup), _serial_number(other)
+        if mine != theirs:
+            what, remedy = f"Another device answers ({theirs}, not {mine})", f"Plug {mine} back in"
+        else:
+            what, remedy = f"{mine} came back with other settings", "Set it as it was"
+        problem = DeviceError(f"{what}: the take waits.", f"{remedy}, or stop the take.")
         self._lose()
         self.newest = replace(self.newest, problem=problem)
-
-    def _notice_silence(self, line: _Line) -> None:
-        quiet = time.monotonic() - line.heard
-        if not line.introduced or quiet < SILENCE_S:
-            return
-        if quiet > REOPEN_S:
-            self._lose()
-        elif self.newest.phase is Phase.STREAMING:
-            self.newest = replace(self.newest, phase=Phase.LOST)
-            self._ask(Command.START)  # it may have restarted without a word
 
     def _lose(self) -> None:
         self._close()
         if self._wanted is None:
             return
         self._wanted.try_at = time.monotonic() + RETRY_S
-        health = replace(self._count.view(now_ns()), rate_hz=0.0)
         if self._wanted.was_there:
-            self.newest = replace(self.newest, phase=Phase.LOST, health=health)
+            self._show_lost()
         else:
             self._give_up(
                 DeviceError(
@@ -339,6 +371,10 @@ class Capture:
                     "Check that it is a glove and that nothing else uses it.",
                 )
             )
+
+    def _show_lost(self) -> None:
+        health = replace(self._count.view(now_ns()), rate_hz=0.0)
+        self.newest = replace(self.newest, phase=Phase.LOST, health=health)
 
     def _give_up(self, error: HandstudioError) -> None:
         self._close()
@@ -352,17 +388,24 @@ class Capture:
     def _close(self) -> None:
         if self._line is None:
             return
+        line, self._line = self._line, None
         with contextlib.suppress(SourceLost):
-            self._line.source.write(encode(Request(Command.STOP, 0)))
-        self._line.source.close()
-        self._line = None
+            line.ask(Command.STOP)
+        line.close()
 
     def _ask(self, command: int, argument: bytes = b"") -> None:
         if self._line is None:
             return
-        self._tag = (self._tag + 1) % 256
         try:
-            self._line.source.write(encode(Request(int(command), self._tag, argument)))
+            self._line.ask(command, argument)
+        except SourceLost:
+            self._lose()
+
+    def _ask_again(self, command: Command) -> None:
+        if self._line is None:
+            return
+        try:
+            self._line.ask_again(command)
         except SourceLost:
             self._lose()
 
@@ -427,6 +470,10 @@ class Capture:
         for done in [recorder for recorder in self._closing if recorder.finished]:
             self._closing.remove(done)
             self._reports.append(done.failure or TakeDone(done.path))
+
+
+def _serial_number(setup: Setup | None) -> str:
+    return setup.device.serial_number if setup and setup.device else "the one before"
 
 
 def _emptied(values: deque[T]) -> list[T]:

@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from handstudio.errors import HandstudioError
+from handstudio.errors import HandstudioError, TakeError
 from handstudio.pipeline import Motion
 from handstudio.process import MotionWriter, motion_folder
 from handstudio.recording.header import Header, Summary
@@ -30,6 +30,13 @@ class _End:
     summary: Summary
 
 
+def _motion_writer(path: Path, sensors: int) -> MotionWriter | None:
+    try:
+        return MotionWriter(path, sensors)
+    except OSError:  # the bytes are what counts; the motion can be computed from them
+        return None
+
+
 class Recorder:
     """Records one take; `put` and `put_motion` from the capture thread, the rest from anywhere.
 
@@ -47,12 +54,12 @@ class Recorder:
         self.header = header
         self.started = time.monotonic()
         self.failure: HandstudioError | None = None
-        self.bytes = 0
+        self.bytes = 0  # these two by the capture thread alone
         self.chunks = 0
-        self._waiting = 0
+        self._written = 0  # bytes; by the writer thread alone
         self._queue: queue.SimpleQueue[_Chunk | Motion | _End] = queue.SimpleQueue()
         self._writer = TakeWriter(path, header, first_state)
-        self._motion: MotionWriter | None = MotionWriter(path, len(header.setup.layout.sensors))
+        self._motion = _motion_writer(path, len(header.setup.layout.sensors))
         self._thread = threading.Thread(target=self._run, name="take writer")
         self._thread.start()
 
@@ -62,21 +69,23 @@ class Recorder:
         return time.monotonic() - self.started
 
     def put(self, arrival_ns: int, chunk: bytes) -> None:
-        """Hand over bytes; returns at once."""
+        """Hand over bytes; returns at once. After a failure nothing more enters the take."""
+        if self.failure is not None:
+            return
+        waiting = self.bytes - self._written
+        if waiting + len(chunk) > BACKLOG_LIMIT:
+            self.failure = TakeError(
+                f"{self.path}: the disk is {waiting / 1e6:.0f} MB behind.",
+                "Record to a faster disk. The take is kept up to here.",
+            )
+            return
         self.bytes += len(chunk)
         self.chunks += 1
-        self._waiting += len(chunk)
-        if self._waiting < BACKLOG_LIMIT:
-            self._queue.put(_Chunk(arrival_ns, chunk))
-        elif self.failure is None:
-            self.failure = HandstudioError(
-                f"{self.path}: the disk has not taken {self._waiting >> 20} MB.",
-                "Stop, and record to a faster disk. What was written until now is kept.",
-            )
+        self._queue.put(_Chunk(arrival_ns, chunk))
 
     def put_motion(self, motion: Motion) -> None:
         """Hand over the live result, so that the take opens at once."""
-        if self._waiting < BACKLOG_LIMIT:
+        if self.failure is None:
             self._queue.put(motion)
 
     def stop(self, summary: Summary) -> None:
@@ -118,7 +127,7 @@ class Recorder:
             match item:
                 case _Chunk(arrival_ns=arrival_ns, data=data):
                     self._writer.write(arrival_ns, data)
-                    self._waiting -= len(data)
+                    self._written += len(data)
                 case Motion():
                     self._append_motion(item)
                 case _End(summary=summary):

@@ -1,0 +1,101 @@
+"""An open line to a device: questions go out on it, and it is known who is there, or not yet."""
+
+from __future__ import annotations
+
+import time
+
+from handstudio.device.source import ByteSource
+from handstudio.protocol.codec import encode
+from handstudio.protocol.decoder import Decoder, decoder_named
+from handstudio.protocol.framing import DELIMITER
+from handstudio.protocol.packets import Command, Packet, Request
+
+READ_S = 0.02
+"""How long a read waits for the first byte, and so how soon an order is heard."""
+
+ASK_S = 0.5
+"""Between two times of asking the same."""
+
+
+class Line:
+    """A line and what happened on it. What it says is held until it is known who says it.
+
+    Args:
+        source: The open source, ours from now on.
+        decoder: Name of the device's decoder.
+
+    Attributes:
+        introduced: It is known who is there.
+        opened: When it was opened, or who is there became unknown [monotonic s].
+        heard: When the last byte came.
+        moved: When the last motion came, or the device was met.
+        received: Bytes so far.
+    """
+
+    def __init__(self, source: ByteSource, decoder: str) -> None:
+        self.introduced = False
+        self.received = 0
+        self.opened = self.heard = self.moved = time.monotonic()
+        self._source = source
+        self._decoder = decoder
+        self._scout: Decoder = decoder_named(decoder)()
+        self._held: list[tuple[int, bytes]] = []
+        self._asked: dict[int, float] = {}
+        self._tag = 0
+        self._greeted = False
+
+    def read(self) -> bytes:
+        """What came, maybe nothing, waiting a little for it.
+
+        Raises:
+            SourceLost: the other end went away.
+        """
+        chunk = self._source.read(READ_S)
+        if chunk:
+            self.heard = time.monotonic()
+            self.received += len(chunk)
+        return chunk
+
+    def ask(self, command: int, argument: bytes = b"") -> None:
+        """Send a command.
+
+        Raises:
+            SourceLost: the other end went away.
+            ValueError: it is no command.
+        """
+        self._tag = (self._tag + 1) % 256
+        question = encode(Request(int(command), self._tag, argument))
+        # whatever half a frame the device still holds of somebody else ends here
+        self._source.write(question if self._greeted else DELIMITER + question)
+        self._greeted = True
+        self._asked[command] = time.monotonic()
+
+    def ask_again(self, command: Command) -> None:
+        """Send a command unless it was sent just now.
+
+        Raises:
+            SourceLost: the other end went away.
+        """
+        if time.monotonic() - self._asked.get(command, -ASK_S) >= ASK_S:
+            self.ask(command)
+
+    def hold(self, arrival_ns: int, chunk: bytes) -> list[Packet]:
+        """Keep what came before it is known from whom; what it says, for finding out."""
+        self._held.append((arrival_ns, chunk))
+        return self._scout.feed(chunk)
+
+    def release(self) -> list[tuple[int, bytes]]:
+        """What was held, with its times of arrival; it is held no more."""
+        held, self._held = self._held, []
+        return held
+
+    def forget(self) -> None:
+        """The device began anew: it must say again who it is."""
+        self.introduced = False
+        self.opened = time.monotonic()
+        self._asked.clear()
+        self._scout = decoder_named(self._decoder)()
+
+    def close(self) -> None:
+        """Let go; never raises."""
+        self._source.close()
