@@ -42,7 +42,9 @@ class Server:
         return f"http://localhost:{self._viser.get_port()}"
 
     def render(self, state: State) -> None:
-        """Bring all pages up to date."""
+        """Bring all pages up to date; with none open there is nothing to draw."""
+        if not self._viser.get_clients():
+            return
         with self._viser.atomic():
             self._scene.render(scene_of(state), state.yaw)
         self._page.render(state)

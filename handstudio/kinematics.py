@@ -50,12 +50,11 @@ def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Fl
     drivers = setup.layout.drivers
     q_sensor_segment = nominal_mounting(setup.layout)
     out = np.empty((len(q_world_sensor), len(SEGMENTS), 4))
-    for index, name in enumerate(SEGMENTS):
-        if name in drivers:
-            sensor = drivers[name]
-            out[:, index] = so3.multiply(q_world_sensor[:, sensor], q_sensor_segment[sensor])
-        else:
-            out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
+    driven = [index for index, name in enumerate(SEGMENTS) if name in drivers]
+    sensors = [drivers[SEGMENTS[index]] for index in driven]
+    out[:, driven] = so3.multiply(q_world_sensor[:, sensors], q_sensor_segment[sensors])
+    for index in sorted(set(range(len(SEGMENTS))) - set(driven)):
+        out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
     return out
 
 

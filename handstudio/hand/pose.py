@@ -28,10 +28,10 @@ def posed(skeleton: Skeleton, q_world_segment: Float[Array, "*n k 4"]) -> Pose:
     """Place a skeleton: a point at the end of a chain is the sum of its turned links (2.14)."""
     t_world_joint = np.empty((*q_world_segment.shape[:-1], 3))
     t_world_joint[..., 0, :] = skeleton.t_parent_joint[0]
+    links = so3.rotate(q_world_segment[..., list(PARENTS), :], skeleton.t_parent_joint)
     for child, parent in enumerate(PARENTS):
         if parent >= 0:
-            link = so3.rotate(q_world_segment[..., parent, :], skeleton.t_parent_joint[child])
-            t_world_joint[..., child, :] = t_world_joint[..., parent, :] + link
+            t_world_joint[..., child, :] = t_world_joint[..., parent, :] + links[..., child, :]
     distal = [SEGMENTS.index(name) for name in DISTALS]
     tips = so3.rotate(q_world_segment[..., distal, :], skeleton.t_distal_tip)
     return Pose(q_world_segment, t_world_joint, t_world_joint[..., distal, :] + tips)

@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from benchmarks.recordings import broad_folder, dfjimu_folder
 from handstudio.recording.raw_import import import_folder
 from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .test_loop import button
+from .test_loop import button, moves_within
 
 pytestmark = pytest.mark.browser
 
@@ -107,6 +108,25 @@ def test_on_a_narrow_page_the_plots_start_put_away(
     expect(narrow.get_by_text("Connected")).to_be_visible()
     narrow.wait_for_timeout(1500)
     expect(narrow.get_by_text("MCP flexion")).not_to_be_visible()
+
+
+@pytest.mark.real
+def test_real_recordings_are_replayed(
+    start_studio: Start, visit: Callable[..., Page], tmp_path: Path, data_dir: Path
+) -> None:
+    for kind, write in (("broad", broad_folder), ("dfjimu", dfjimu_folder)):
+        trial = sorted((data_dir / kind).glob("*.mat"))[0]
+        write(trial, tmp_path / kind)
+        import_folder(tmp_path / kind, tmp_path / "sessions", "real")
+    page = visit(start_studio())
+    page.get_by_role("tab", name="Review").click()
+    for kind, curve in (("broad", "IMU"), ("dfjimu", "Turn across the joint")):
+        choose(page, kind)
+        expect(page.get_by_text(f"Replay · {kind}")).to_be_visible()
+        expect(page.get_by_text(curve).first).to_be_visible()
+        button(page, "Play").click()
+        assert moves_within(page, 10.0)
+        button(page, "Pause").click()
 
 
 def choose(page: Page, name: str) -> None:
