@@ -9,6 +9,7 @@ import hashlib
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -111,7 +112,8 @@ class MotionWriter:
 
     def finish(self, folder: Path) -> None:
         """Close and move to where `process` looks for it."""
-        self._close()
+        for file in self._files.values():
+            file.close()
         meta = _Meta(self._count, self._sensors, __version__)
         (self._folder / "meta.json").write_bytes(msgspec.json.encode(meta))
         if not folder.exists():  # somebody may have been faster: the same numbers
@@ -120,12 +122,10 @@ class MotionWriter:
 
     def discard(self) -> None:
         """Leave nothing behind."""
-        self._close()
-        shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _close(self) -> None:
         for file in self._files.values():
-            file.close()
+            with suppress(OSError):  # a full disk does not take the rest: it is not wanted either
+                file.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def _compute(take: Take, setup: Setup, from_start: bool, folder: Path, progress: Progress) -> None:
