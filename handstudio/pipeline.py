@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import IntFlag
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -23,7 +23,8 @@ from handstudio.samples import Event, Gap, ImuSamples, Why
 from handstudio.setup import Setup
 
 BRIDGE_S = 0.25
-"""Longest gap that is bridged by interpolation; after a longer one attitudes begin anew."""
+"""Longest gap that is bridged by interpolation; after a longer one attitudes begin anew. After a
+longer silence of one sensor its attitude is in doubt until it rests."""
 
 _JUMP = 1.5  # sample periods: a longer step means that instants are missing
 
@@ -31,7 +32,7 @@ _JUMP = 1.5  # sample periods: a longer step means that instants are missing
 class Doubt(IntFlag):
     """Why an orientation should not be taken at face value."""
 
-    UNPLACED = 1  # not yet initialised at rest (start, or after a long gap)
+    UNPLACED = 1  # not yet initialised at rest (start, or after a long gap or silence)
     AFTER_GAP = 2  # the first instant after missing ones
     SATURATED = 4
     SILENT = 8  # the sensor did not answer: its orientation is held
@@ -67,6 +68,7 @@ class State:
     q_world_start: Float[Array, " 4"]
     recent: ImuSamples  # a window of samples, while a sensor still waits for its rest
     last: ImuSamples  # the newest sample, or none
+    heard_us: Int64[Array, " s"]  # when each sensor answered last
     clock_offset_us: int  # what continues the time axis over restarts of the device
     resume_at_us: int | None  # after a restart: where on the time axis its first sample belongs
 
@@ -80,6 +82,7 @@ def begin(setup: Setup) -> State:
         q_world_start=np.full(4, np.nan),
         recent=_nothing(sensors),
         last=_nothing(sensors),
+        heard_us=np.zeros(sensors, dtype=np.int64),
         clock_offset_us=0,
         resume_at_us=None,
     )
@@ -138,8 +141,7 @@ def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[
             continue
         part = samples[start:end]
         if stretch[start] > _JUMP:
-            state = _over_gap(setup, state, part, stretch[start])
-            stretch[start] = 1.0
+            state, stretch[start] = _over_gap(setup, state, part, stretch[start])
             flag = Doubt.AFTER_GAP
         else:
             flag = Doubt(0)
@@ -152,7 +154,22 @@ def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[
 def _run_unbroken(
     setup: Setup, state: State, samples: ImuSamples, stretch: Array, motions: list[Motion]
 ) -> State:
-    """Fuse samples without a gap, placing each sensor at its first rest."""
+    """Fuse samples without a gap; a sensor that was silent for long waits for its rest anew."""
+    answered = np.where(samples.valid, samples.time_us[:, None], 0)
+    heard = np.maximum.accumulate(np.concatenate([state.heard_us[None], answered]))
+    silence = samples.time_us[:, None] - heard[:-1]
+    back = samples.valid & (silence > BRIDGE_S * 1e6)
+    cuts = [0, *(int(i) for i in np.flatnonzero(back.any(axis=1)) if i > 0), len(samples)]
+    for start, end in pairwise(cuts):
+        state = replace(state, placed=state.placed & ~back[start])
+        state = _run_placing(setup, state, samples[start:end], stretch[start:end], motions)
+    return replace(state, heard_us=heard[-1])
+
+
+def _run_placing(
+    setup: Setup, state: State, samples: ImuSamples, stretch: Array, motions: list[Motion]
+) -> State:
+    """Fuse samples, placing each sensor at its first rest."""
     if state.placed.all():
         return _fuse(setup, state, samples, stretch, motions)
     window = max(2, round(REST_S * setup.rate_hz))
@@ -173,7 +190,9 @@ def _run_unbroken(
                 state = _place(setup, state, sensor, rest.q_world_sensor, rest.gyr_bias)
         done = here
     state = _fuse(setup, state, samples[done:], stretch[done:], motions)
-    return replace(state, recent=recent[max(0, len(recent) - window + 1) :])
+    # nobody waits any more: nothing to keep, nothing to save with the state
+    kept = 0 if state.placed.all() else min(len(recent), window - 1)
+    return replace(state, recent=recent[len(recent) - kept :])
 
 
 def _place(setup: Setup, state: State, sensor: int, attitude: Array, bias: Array) -> State:
@@ -202,10 +221,14 @@ def _fuse(
     return replace(state, filter=fused, last=samples[-1:])
 
 
-def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> State:
-    """Carry the filter over missing instants, or begin anew where they are too many."""
+def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> tuple[State, float]:
+    """Carry the filter over missing instants, or begin anew where they are too many.
+
+    Returns:
+        The state, and the length of the step that is left to the first sample after the gap.
+    """
     if periods > BRIDGE_S * setup.rate_hz:
-        return _unplaced(state, setup.filter.restart(state.filter))
+        return _unplaced(state, setup.filter.restart(state.filter)), 1.0
     missing = round(periods) - 1
     share = (np.arange(1, missing + 1) / (missing + 1))[:, None, None]
     first, last = after[:1], state.last
@@ -218,10 +241,10 @@ def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> 
         valid=np.repeat(last.valid & first.valid, missing, axis=0),
         saturated=np.zeros((missing, last.gyr.shape[1]), dtype=bool),
     )
-    stretch = np.full(missing, periods / (missing + 1))
-    _, fused = setup.filter.run(state.filter, bridge, stretch, bridge.valid)
+    step = periods / (missing + 1)
+    _, fused = setup.filter.run(state.filter, bridge, np.full(missing, step), bridge.valid)
     # a rest may not reach over a gap: nobody knows what happened in it
-    return replace(state, filter=fused, recent=_nothing(len(state.placed)))
+    return replace(state, filter=fused, recent=_nothing(len(state.placed))), step
 
 
 def _after_restart(setup: Setup, state: State, elapsed_us: int) -> State:
@@ -263,12 +286,13 @@ class _PackedSamples(msgspec.Struct):
 
 
 class _Packed(msgspec.Struct):
-    version: int
+    version: Literal[2]
     filter: bytes
     placed: list[bool]
     q_world_start: list[float]
     recent: _PackedSamples
     last: _PackedSamples
+    heard_us: list[int]
     clock_offset_us: int
     resume_at_us: int | None
 
@@ -277,12 +301,13 @@ def pack(setup: Setup, state: State) -> bytes:
     """Serialise a state, to the last bit."""
     return msgspec.msgpack.encode(
         _Packed(
-            1,
+            2,
             setup.filter.pack(state.filter),
             state.placed.tolist(),
             state.q_world_start.tolist(),
             _pack_samples(state.recent),
             _pack_samples(state.last),
+            state.heard_us.tolist(),
             state.clock_offset_us,
             state.resume_at_us,
         )
@@ -308,6 +333,7 @@ def unpack(setup: Setup, packed: bytes) -> State:
         np.array(got.q_world_start),
         _unpack_samples(got.recent),
         _unpack_samples(got.last),
+        np.array(got.heard_us, dtype=np.int64),
         got.clock_offset_us,
         got.resume_at_us,
     )
