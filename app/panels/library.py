@@ -67,7 +67,8 @@ class LibraryPanel:
 
     def _chosen(self, event: Any) -> None:
         entry = self._labels.get(self._choice.value)
-        if event.client is not None and entry is not None:
+        # an interrupted recording has nothing to open: the words and the button below speak of it
+        if event.client is not None and entry is not None and entry.take is not None:
             self._send(intents.OpenTake(entry.path))
 
     def _ask_recovery(self) -> None:

@@ -52,8 +52,8 @@ class Page:
 
     def render(self, state: State) -> None:
         """Bring the page up to date; what changes fast more often than what is read."""
-        self._transport.render(state)
         if self._tick % PLOTS_EVERY == 0:
+            self._transport.render(state)
             self._render_plots(state)
         if self._tick % TEXTS_EVERY == 0 or state.messages:
             self._render_texts(state)

@@ -32,6 +32,7 @@ class TransportPanel:
             self._live = gui.add_button(_("Back to the live hand"), icon=viser.Icon.HAND_STOP)
         self._panel.float(x=16.0, y=-16.0, width=400.0, height=228.0)
         self._playing = False
+        self._written = 0.0
         self._time.on_update(
             lambda event: send(intents.Seek(event.target.value)) if event.client else None
         )
@@ -47,11 +48,15 @@ class TransportPanel:
             return
         end = max(review.duration_s, _STEP_S)
         if self._time.max != end:
+            self._written = 0.0
             put(self._time, value=0.0)
             put(self._time, max=end)
         # rounded down: a value above the end would be refused by the page
         at = min(int(review.at_s / _STEP_S) * _STEP_S, end)
-        if abs(self._time.value - at) > _STEP_S / 2:
+        # only where the take moved by itself: else a time just typed, whose intent is still on its
+        # way, would be overwritten
+        if at != self._written:
+            self._written = at
             put(self._time, value=at)
         here = f"{clock_of(review.at_s)} / {clock_of(review.duration_s)}"
         put(self._clock, content=here)

@@ -15,6 +15,8 @@ import PIL.Image
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from app.view import clock_of
+
 from .conftest import COMMAND, RunningStudio, Start
 
 pytestmark = pytest.mark.browser
@@ -108,7 +110,7 @@ def scrub_to(page: Page, at_s: float) -> None:
     ]
     numbers[-1].fill(f"{at_s}")  # the slider's own field: the transport comes last on the page
     numbers[-1].press("Enter")
-    expect(page.get_by_text(re.compile(rf"0:0{at_s:.1f} / "))).to_be_visible()
+    expect(page.get_by_text(f"{clock_of(at_s)} / ")).to_be_visible()
 
 
 def assert_same_as_the_shell_computes(

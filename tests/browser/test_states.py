@@ -16,7 +16,7 @@ from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .test_loop import button, moves_within
+from .test_loop import button, moves_within, scrub_to
 
 pytestmark = pytest.mark.browser
 
@@ -124,6 +124,7 @@ def test_real_recordings_are_replayed(
         choose(page, kind)
         expect(page.get_by_text(f"Replay · {kind}")).to_be_visible()
         expect(page.get_by_text(curve).first).to_be_visible()
+        scrub_to(page, 40.0)  # trials begin at rest
         button(page, "Play").click()
         assert moves_within(page, 10.0)
         button(page, "Pause").click()
