@@ -94,15 +94,18 @@ def run(setup: Setup, state: State, events: Iterable[Event]) -> tuple[Motion, St
     Returns:
         The motion of these events, one instant a sample, and the state to go on from.
     """
-    motions = [empty(len(setup.layout.sensors))]
+    sensors = len(setup.layout.sensors)
+    motions = [empty(sensors)]
     for event in events:
         match event:
             case Gap(why=Why.RESTART, elapsed_us=elapsed):
                 state = _after_restart(setup, state, elapsed)
             case Gap():
                 pass  # the step in the clock tells the same, and how long it was
-            case ImuSamples():
+            case ImuSamples() if event.gyr.shape[1] == sensors:
                 state = _run_samples(setup, state, event, motions)
+            case ImuSamples():
+                pass  # of a device that restarted with other sensors: not this setup's motion
     return join(motions), state
 
 
