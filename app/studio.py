@@ -270,7 +270,7 @@ class Studio:
         if motion is not None:
             self._show(reviewing.opened(take, motion))
             return
-        words = _("Computing the motion of {name}").format(name=take.header.name)
+        words = _("Computing the motion of {name}").format(name=path.stem)
         self._pending.append(_Pending(self.jobs.process(path), _ShowTake(take), words))
 
     def _show(self, review: Review) -> None:

@@ -154,7 +154,7 @@ def caption_of(state: State) -> str:
     review = state.review
     if review is not None:
         what = _("Replay · {name} · {subject}").format(
-            name=review.take.header.name, subject=review.take.header.subject
+            name=review.take.path.stem, subject=review.take.header.subject
         )
         return " · ".join(filter(None, [what, review.setup.layout.missing_for_hand]))
     newest = state.newest

@@ -98,7 +98,7 @@ class LibraryPanel:
         )
         zero = _("Zero of angles: {zero}").format(zero=header.setup.zero)
         return (
-            f"**{header.name}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
+            f"**{review.take.path.stem}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
             f"{clock_of(review.duration_s)} · {counts}\n\n{zero}"
         )
 

@@ -108,8 +108,12 @@ def scrub_to(page: Page, at_s: float) -> None:
         for field in page.locator("input:visible").all()
         if re.fullmatch(r"\d+(\.\d+)?", field.input_value())
     ]
-    numbers[-1].fill(f"{at_s}")  # the slider's own field: the transport comes last on the page
-    numbers[-1].press("Enter")
+    field = numbers[-1]  # the slider's own: the transport comes last on the page
+    # the page's number field passes over the first input after its value was set from outside
+    for text in (f"{at_s + 1.0}", f"{at_s}"):
+        field.fill(text)
+        field.press("Enter")
+        page.wait_for_timeout(300)
     expect(page.get_by_text(f"{clock_of(at_s)} / ")).to_be_visible()
 
 
