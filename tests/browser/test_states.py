@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -69,6 +70,27 @@ def test_a_lost_device_is_shown_within_a_second_and_the_take_goes_on(
     assert summary is not None
     assert summary.duration_s > 3.0
     assert summary.packets > 200
+
+
+def test_ctrl_c_while_recording_keeps_the_take(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    studio = start_studio("--virtual")
+    page = visit(studio)
+    expect(page.get_by_text("Connected")).to_be_visible()
+    button(page, "Record").click()
+    expect(button(page, "Stop")).to_be_visible()
+    page.wait_for_timeout(1500)
+    page.close()  # a closed page ends nothing
+    time.sleep(1.0)
+    studio.process.send_signal(signal.SIGINT)
+    output, _ = studio.process.communicate(timeout=30)
+    takes = list(studio.sessions.glob("*/*/*.mcap"))
+    assert len(takes) == 1
+    assert str(takes[0]) in output
+    summary = open_take(takes[0]).summary
+    assert summary is not None
+    assert summary.duration_s > 2.4
 
 
 def test_an_interrupted_recording_can_be_had_back(
