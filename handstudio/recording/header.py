@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
 from typing import Literal
 
 import msgspec
 
 from handstudio import __version__
-from handstudio.errors import TakeError
+from handstudio.errors import LayoutError, TakeError
 from handstudio.setup import Setup
 
 PROFILE = "handstudio"
@@ -56,9 +57,9 @@ class Summary(msgspec.Struct, frozen=True):
     clock_drift_ppm: float | None = None
 
 
-def encode_header(header: Header) -> dict[str, str]:
-    """The metadata record of a header."""
-    return {"json": msgspec.json.encode(header).decode()}
+def encode_header(header: Header, first_state: bytes) -> dict[str, str]:
+    """The metadata record of a header, which also vouches for the first state."""
+    return {**_vouched(header), _STATE_CHECKSUM: _checksum(first_state)}
 
 
 def decode_header(record: dict[str, str], place: str) -> Header:
@@ -68,8 +69,8 @@ def decode_header(record: dict[str, str], place: str) -> Header:
         TakeError: the record is damaged or of another version.
     """
     try:
-        header = msgspec.json.decode(record["json"], type=Header)
-    except (KeyError, msgspec.MsgspecError) as error:
+        header = msgspec.json.decode(_checked(record), type=Header)
+    except (KeyError, msgspec.MsgspecError, LayoutError, _DamagedError) as error:
         raise TakeError(
             f"{place}: the header of the take cannot be read ({error}).",
             "Open it with the version of handstudio that recorded it, or update handstudio.",
@@ -80,3 +81,47 @@ def decode_header(record: dict[str, str], place: str) -> Header:
             "Update handstudio.",
         )
     return header
+
+
+def sound_state(record: dict[str, str], first_state: bytes) -> bytes:
+    """A first state as its header's record knows it; empty where it was damaged."""
+    known = record.get(_STATE_CHECKSUM, _checksum(first_state))
+    return first_state if known == _checksum(first_state) else b""
+
+
+def encode_summary(summary: Summary) -> dict[str, str]:
+    """The metadata record of a summary."""
+    return _vouched(summary)
+
+
+def decode_summary(record: dict[str, str]) -> Summary:
+    """Inverse of `encode_summary`.
+
+    Raises:
+        ValueError: the record is damaged.
+    """
+    return msgspec.json.decode(_checked(record), type=Summary)
+
+
+# The container has checksums for its chunks, but none for metadata.
+_CHECKSUM, _STATE_CHECKSUM = "crc32", "first_state_crc32"
+
+
+class _DamagedError(ValueError):
+    """A record is not what was written."""
+
+
+def _vouched(value: Header | Summary) -> dict[str, str]:
+    data = msgspec.json.encode(value)
+    return {"json": data.decode(), _CHECKSUM: _checksum(data)}
+
+
+def _checked(record: dict[str, str]) -> str:
+    text = record["json"]
+    if record.get(_CHECKSUM, _checksum(text.encode())) != _checksum(text.encode()):
+        raise _DamagedError("it is damaged: its checksum is wrong")
+    return text
+
+
+def _checksum(data: bytes) -> str:
+    return f"{zlib.crc32(data):08x}"

@@ -9,7 +9,13 @@ from pathlib import Path
 from mcap.records import Attachment, McapRecord, Message, Metadata
 
 from handstudio.errors import TakeError
-from handstudio.recording.header import HEADER_RECORD, STATE_ATTACHMENT, Header, decode_header
+from handstudio.recording.header import (
+    HEADER_RECORD,
+    STATE_ATTACHMENT,
+    Header,
+    decode_header,
+    sound_state,
+)
 from handstudio.recording.take import DAMAGE, records_until_damage
 from handstudio.recording.writer import UNFINISHED, TakeWriter
 
@@ -38,11 +44,15 @@ def recover(path: Path) -> Recovered:
     header, state = _beginning(records, path)
     writer = TakeWriter(target, header, state)
     first = last = None
-    for record in records:
-        if isinstance(record, Message):
-            writer.write(record.log_time, record.data)
-            first, last = first or record.log_time, record.log_time
-    writer.close()
+    try:
+        for record in records:
+            if isinstance(record, Message):
+                writer.write(record.log_time, record.data)
+                first, last = first or record.log_time, record.log_time
+        writer.close()
+    except BaseException:
+        writer.discard()  # a copy of a part: the damaged file still has it all
+        raise
     duration = (last - first) * 1e-9 if first is not None and last is not None else 0.0
     return Recovered(target, writer.chunks, writer.bytes, duration)
 
@@ -60,12 +70,13 @@ def _readable(path: Path) -> Iterator[McapRecord]:
 
 
 def _beginning(records: Iterator[McapRecord], path: Path) -> tuple[Header, bytes]:
-    header = None
+    header, about = None, dict[str, str]()
     for record in records:
         if isinstance(record, Metadata) and record.name == HEADER_RECORD:
-            header = decode_header(record.metadata, str(path))
+            about = record.metadata
+            header = decode_header(about, str(path))
         if isinstance(record, Attachment) and record.name == STATE_ATTACHMENT and header:
-            return header, record.data
+            return header, sound_state(about, record.data)
     raise TakeError(
         f"{path}: holds nothing of a take that can be read.",
         "If it was recorded elsewhere, copy it again: the copy may be cut short.",

@@ -26,6 +26,8 @@ from handstudio.recording.header import (
     Header,
     Summary,
     decode_header,
+    decode_summary,
+    sound_state,
 )
 from handstudio.recording.samples_message import decode_samples
 from handstudio.recording.writer import UNFINISHED
@@ -35,7 +37,10 @@ from handstudio.stream import EventStream
 RECORD_LIMIT = 1 << 28
 """No record of ours is longer [bytes]; a length beyond it is damage, not a reason to wait."""
 
-DAMAGE = (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, MemoryError)
+DAMAGE = (
+    *(McapError, ZstdError, struct.error),
+    *(ValueError, EOFError, KeyError, MemoryError, OverflowError),
+)
 """What reading a damaged file may raise."""
 
 
@@ -72,9 +77,13 @@ class Take:
         Raises:
             TakeError: the file is damaged; all before the damage has been given.
         """
+        count = 0
         for record in _records(self.path):
             if isinstance(record, Message):
+                count += 1
                 yield record.log_time, record.data
+        if self.summary is not None and count != self.summary.chunks:
+            raise _damaged(self.path, ValueError(f"{self.summary.chunks - count} chunks missing"))
 
     def events(self, from_start: bool = False) -> Iterator[list[Event]]:
         """Events in the order they came, chunk by chunk; memory does not grow with length.
@@ -118,13 +127,13 @@ def open_take(path: Path) -> Take:
             f"{path}: this recording was interrupted.",
             f"Get back what was saved: handstudio recover '{path}'.",
         )
-    header, state = None, FirstState()
+    header, about, state = None, dict[str, str](), FirstState()
     for record in _records(path):
         match record:
-            case Metadata(name=name, metadata=fields) if name == HEADER_RECORD:
-                header = decode_header(fields, str(path))
+            case Metadata(name=name, metadata=about) if name == HEADER_RECORD:
+                header = decode_header(about, str(path))
             case Attachment(name=name, data=data) if name == STATE_ATTACHMENT:
-                state = unpack_first_state(data)
+                state = unpack_first_state(sound_state(about, data))
             case Chunk() | Message() | DataEnd():
                 break  # the data follows; it is read when asked for
             case _:
@@ -142,8 +151,8 @@ def _summary(path: Path) -> Summary | None:
             reader.get_summary()
             for record in reader.iter_metadata():
                 if record.name == SUMMARY_RECORD:
-                    return msgspec.json.decode(record.metadata["json"], type=Summary)
-    except DAMAGE as error:
+                    return decode_summary(record.metadata)
+    except (OSError, *DAMAGE) as error:  # OSError: an index that points nowhere
         raise _damaged(path, error) from error
     return None
 
@@ -160,16 +169,31 @@ def unpack_first_state(data: bytes) -> FirstState:
 
 
 def records_until_damage(stream: BinaryIO) -> Iterator[McapRecord]:
-    """Records in order, checksums verified; chunks opened, their messages following them.
+    """Records in order, checksums verified; chunks are followed by their messages, none missing.
 
     Raises:
         One of `DAMAGE`, where the file stops making sense.
     """
     reader = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT)
+    turn = 0
     for record in reader.records:
+        messages = []
+        match record:
+            case Message():
+                raise ValueError("a message outside a chunk, where none was written")
+            case Chunk():
+                messages = _messages(record)
         yield record
-        if isinstance(record, Chunk):
-            yield from breakup_chunk(record, validate_crc=True)
+        for message in messages:
+            if message.sequence != turn:
+                raise ValueError(f"message {message.sequence} where {turn} belongs")
+            turn += 1
+            yield message
+
+
+def _messages(chunk: Chunk) -> list[Message]:
+    records = breakup_chunk(chunk, validate_crc=True)
+    return [record for record in records if isinstance(record, Message)]
 
 
 def _records(path: Path) -> Iterator[McapRecord]:

@@ -24,6 +24,7 @@ from handstudio.recording.header import (
     Header,
     Summary,
     encode_header,
+    encode_summary,
 )
 from handstudio.recording.samples_message import encode_samples
 from handstudio.samples import ImuSamples
@@ -57,20 +58,11 @@ class TakeWriter:
         self._unfinished = path.with_name(path.name + UNFINISHED)
         self._flushed_at = time.monotonic()
         self._stream = self._create()
-        with self._saying_what_to_do():
-            self._writer = Writer(self._stream, chunk_size=1 << 20)
-            self._writer.start(PROFILE, f"handstudio {__version__}")
-            self._writer.add_metadata(HEADER_RECORD, encode_header(header))
-            self._writer.add_attachment(
-                header.start_utc_ns,
-                header.start_utc_ns,
-                STATE_ATTACHMENT,
-                "application/octet-stream",
-                first_state,
-            )
-            topic = WIRE_TOPIC if header.kind == "wire" else SAMPLES_TOPIC
-            self._channel = self._writer.register_channel(topic, "application/octet-stream", 0)
-            self.flush()
+        try:
+            self._begin(header, first_state)
+        except BaseException:
+            self.discard()  # nothing is in it, and it would stand in the way of the next try
+            raise
 
     def write(self, arrival_ns: int, chunk: bytes) -> None:
         """Append bytes as they arrived; flushes when it is time.
@@ -96,11 +88,14 @@ class TakeWriter:
             self._flushed_at = time.monotonic()
 
     def close(self, summary: Summary | None = None) -> Path:
-        """Finish the file and give it its name."""
+        """Finish the file and give it its name.
+
+        What the summary says of chunks and bytes is what was written here.
+        """
         with self._saying_what_to_do():
             if summary is not None:
-                fields = {"json": msgspec.json.encode(summary).decode()}
-                self._writer.add_metadata(SUMMARY_RECORD, fields)
+                told = msgspec.structs.replace(summary, chunks=self.chunks, bytes=self.bytes)
+                self._writer.add_metadata(SUMMARY_RECORD, encode_summary(told))
             self._writer.finish()
             self._stream.flush()
             os.fsync(self._stream.fileno())
@@ -114,6 +109,12 @@ class TakeWriter:
         with contextlib.suppress(OSError, ValueError):
             self._stream.close()
 
+    def discard(self) -> None:
+        """Let go of the file and remove it: for copies of what is safe elsewhere."""
+        self.abandon()
+        with contextlib.suppress(OSError):
+            self._unfinished.unlink(missing_ok=True)
+
     def _create(self) -> BinaryIO:
         _refuse_existing(self.path)
         with self._saying_what_to_do():
@@ -126,6 +127,22 @@ class TakeWriter:
                     f"Recover it first (handstudio recover '{self._unfinished}'), "
                     "or record under another name.",
                 ) from error
+
+    def _begin(self, header: Header, first_state: bytes) -> None:
+        with self._saying_what_to_do():
+            self._writer = Writer(self._stream, chunk_size=1 << 20)
+            self._writer.start(PROFILE, f"handstudio {__version__}")
+            self._writer.add_metadata(HEADER_RECORD, encode_header(header, first_state))
+            self._writer.add_attachment(
+                header.start_utc_ns,
+                header.start_utc_ns,
+                STATE_ATTACHMENT,
+                "application/octet-stream",
+                first_state,
+            )
+            topic = WIRE_TOPIC if header.kind == "wire" else SAMPLES_TOPIC
+            self._channel = self._writer.register_channel(topic, "application/octet-stream", 0)
+            self.flush()
 
     @contextlib.contextmanager
     def _saying_what_to_do(self) -> Iterator[None]:
