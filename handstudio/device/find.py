@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from serial.tools import list_ports
 
 from handstudio.device.addresses import open_source
-from handstudio.device.source import ByteSource, SourceLost
+from handstudio.device.host_clock import now_ns
+from handstudio.device.line import Line
+from handstudio.device.source import SourceLost
 from handstudio.errors import HandstudioError
-from handstudio.protocol.codec import encode
-from handstudio.protocol.decoder import decoder_named
-from handstudio.protocol.packets import Command, Description, ForeignVersion, Request
+from handstudio.protocol.packets import Command, Description, ForeignVersion
 
 PROBE_S = 1.0
 
@@ -41,7 +41,7 @@ def ports() -> list[Found]:
     return [
         Found(f"serial:{port.device}", _label(port.device, port.description, port.product))
         for port in sorted(list_ports.comports())
-        if port.vid is not None or "bluetooth" in (port.description or "").lower()
+        if port.vid is not None or _is_bluetooth(port.device, port.description)
     ]
 
 
@@ -52,19 +52,20 @@ def probe(address: str, decoder: str = "handstudio-1") -> Found:
     except HandstudioError as error:
         return Found(address, address, problem=str(error))
     try:
-        return _ask(source, address, decoder)
+        return _ask(Line(source, decoder), address)
     except SourceLost as lost:
         return Found(address, address, problem=f"closed the line ({lost})")
+    except HandstudioError as error:
+        return Found(address, address, problem=str(error))
     finally:
         source.close()
 
 
-def _ask(source: ByteSource, address: str, decoder: str) -> Found:
-    listening = decoder_named(decoder)()
-    source.write(encode(Request(Command.DESCRIBE, 0)))
-    end = time.monotonic() + PROBE_S
+def _ask(line: Line, address: str) -> Found:
+    end = line.opened + PROBE_S
     while time.monotonic() < end:
-        for packet in listening.feed(source.read(0.1)):
+        line.ask_again(Command.DESCRIBE)
+        for packet in line.hold(now_ns(), line.read()):
             match packet:
                 case Description():
                     return Found(address, f"{packet.name} ({packet.serial_number})", packet)
@@ -75,6 +76,13 @@ def _ask(source: ByteSource, address: str, decoder: str) -> Found:
     return Found(address, address, problem="does not say that it is a glove")
 
 
+def _is_bluetooth(device: str, description: str | None) -> bool:
+    told = f"{device} {description}".lower()
+    return "bluetooth" in told or "rfcomm" in told
+
+
 def _label(device: str, description: str | None, product: str | None) -> str:
     name = product or description or ""
-    return f"{name} ({device})" if name and name != "n/a" else device
+    if not name or name == "n/a":
+        return device
+    return name if device in name else f"{name} ({device})"

@@ -82,7 +82,7 @@ def _description(take: Take) -> Description:
         sensors=tuple(numbers),
         rate_hz=round(setup.rate_hz),
         max_rate_hz=round(setup.rate_hz),
-        magnetometer_rate_hz=min(100, round(setup.rate_hz)),
+        magnetometer_rate_hz=round(setup.magnetometer_rate_hz or 0),
         accelerometer_range_g=ranges.acc / STANDARD_GRAVITY,
         gyroscope_range_dps=float(np.rad2deg(ranges.gyr)),
         magnetometer_range_ut=ranges.mag,

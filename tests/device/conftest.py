@@ -223,6 +223,8 @@ class Port:
 
     def say(self, data: bytes) -> int:
         """Send what fits."""
+        if self._off.is_set():
+            return 0
         try:
             return os.write(self._ours, data)
         except BlockingIOError:
@@ -247,9 +249,13 @@ class Port:
 
     def unplug(self) -> None:
         """Take the port away."""
-        self._off.set()
+        self.hang_up()
         if self._thread is not None:
             self._thread.join()
+
+    def hang_up(self) -> None:
+        """The same, from within what is said."""
+        self._off.set()
         if self._ours >= 0:
             os.close(self._ours)
             os.close(self._hosts)

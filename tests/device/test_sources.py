@@ -33,7 +33,7 @@ from handstudio.recording.header import Header
 from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 from handstudio.recording.writer import TakeWriter
-from handstudio.setup import Setup
+from handstudio.setup import Setup, for_device
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -190,10 +190,9 @@ def test_a_replay_is_the_description_and_then_the_take(take):
     recorded = b"".join(data for _, data in open_take(take).chunks())
     assert heard.endswith(recorded)
     (described,) = decoded(heard.removesuffix(recorded))
-    original = next(packet for packet in decoded(recorded) if isinstance(packet, Description))
-    same = ("name", "serial_number", "side", "sensors", "rate_hz", "gyroscope_range_dps")
-    for name in same:
-        assert getattr(described, name) == getattr(original, name)
+    assert isinstance(described, Description)
+    setup = open_take(take).header.setup
+    assert for_device(described, "handstudio-1", setup.hand) == setup
     source.close()
 
 
