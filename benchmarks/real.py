@@ -125,7 +125,8 @@ def _imported(
 
 
 def _labelled(compared: Compared, labels: tuple[Label, ...]) -> Array:
-    time_s = compared.motion.time_us[compared.rows] * 1e-6
+    time_us = compared.motion.time_us
+    time_s = (time_us[compared.rows] - time_us[0]) * 1e-6
     inside = [(time_s >= label.start_s) & (time_s <= label.end_s) for label in labels]
     labelled: Array = np.logical_or.reduce(inside)
     return labelled

@@ -37,8 +37,9 @@ def load_notes(take: Path) -> Notes:
         TakeError: neither the file nor its backup can be read.
     """
     path = notes_path(take)
+    backup = path.with_name(path.name + BACKUP)
     problem: Exception | None = None
-    for candidate in (path, path.with_name(path.name + BACKUP)):
+    for candidate in (path, backup):
         try:
             return msgspec.json.decode(candidate.read_bytes(), type=Notes)
         except FileNotFoundError:
@@ -49,10 +50,21 @@ def load_notes(take: Path) -> Notes:
         return Notes()
     raise TakeError(
         f"{path}: the notes cannot be read ({problem}).",
-        "Move the file away to go on without notes; the take itself is not touched.",
+        f"Move it and {backup.name} away to go on without notes; the take itself is not touched.",
     )
 
 
 def save_notes(take: Path, notes: Notes) -> None:
-    """Store notes beside a take."""
-    write_atomically(notes_path(take), msgspec.json.format(msgspec.json.encode(notes)))
+    """Store notes beside a take.
+
+    Raises:
+        TakeError: they cannot be written; the notes before are still there.
+    """
+    path = notes_path(take)
+    try:
+        write_atomically(path, msgspec.json.format(msgspec.json.encode(notes)))
+    except OSError as error:
+        raise TakeError(
+            f"{path}: cannot be written ({error.strerror or error}).",
+            "Free some space or check the folder's permissions.",
+        ) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ import pyarrow.parquet
 from handstudio.arrays import Array
 from handstudio.errors import ImportFolderError, LayoutError
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
+from handstudio.protocol.packets import TIP_SENSOR, sensor_name
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.library import new_take_path
 from handstudio.recording.notes import Label, Notes, save_notes
@@ -29,6 +31,7 @@ BLOCK = 1024  # instants in one message of the take
 
 _SIGNALS = ("gyr", "acc", "mag")
 _AXES = ("x", "y", "z")
+_LATEST_US = 2.0**52  # the year 2112, and half of what floats count exactly
 _GUIDE = "docs/import.md shows what a folder must hold."
 
 
@@ -69,12 +72,14 @@ def import_folder(
     header = Header(path.stem, subject, start_ns, setup, "samples", folder.resolve().name)
     writer = TakeWriter(path, header)
     try:
-        for start in range(0, len(content.samples), BLOCK):
-            writer.write_samples(content.samples[start : start + BLOCK], start_ns)
         time_us = content.samples.time_us
+        zero_ns = start_ns - int(time_us[0]) * 1000  # the host time of the folder's own time 0
+        for start in range(0, len(content.samples), BLOCK):
+            writer.write_samples(content.samples[start : start + BLOCK], zero_ns)
         writer.close(Summary(writer.chunks, writer.bytes, float(time_us[-1] - time_us[0]) * 1e-6))
-    finally:
-        writer.abandon()
+    except BaseException:
+        writer.discard()  # the folder still has it all
+        raise
     if content.labels:
         save_notes(path, Notes(labels=content.labels))
     if content.reference is not None:
@@ -112,50 +117,74 @@ def read_folder(folder: Path) -> Folder:
         layout,
         rate,
         magnetometer_rate or None,
-        _labels(folder),
+        _labels(folder, float(time_us[0]) * 1e-6),
         _reference(folder, layout),
     )
 
 
 def _table(folder: Path, stem: str) -> pa.Table | None:
-    parquet, csv = folder / f"{stem}.parquet", folder / f"{stem}.csv"
-    try:
-        if parquet.exists():
-            return pa.parquet.read_table(parquet)
-        if csv.exists():
-            return pa.csv.read_csv(csv)
-    except (pa.ArrowException, OSError) as error:
-        raise ImportFolderError(
-            f"{folder / stem}: cannot be read as a table ({error}).",
-            "It needs one header row, commas, and a number in every cell. " + _GUIDE,
-        ) from error
+    for name, read in _READERS.items():
+        path = folder / f"{stem}{name}"
+        if not path.exists():
+            continue
+        try:
+            table = read(path)
+        except (pa.ArrowException, OSError) as error:
+            raise ImportFolderError(
+                f"{path}: cannot be read as a table ({error}).",
+                "It needs one header row, commas, and a number in every cell. " + _GUIDE,
+            ) from error
+        repeated = [name for name in table.column_names if table.column_names.count(name) > 1]
+        if repeated:
+            raise ImportFolderError(f"{path}: more than one column {repeated[0]}.", "Keep one.")
+        return table
     return None
+
+
+_READERS: dict[str, Callable[[Path], pa.Table]] = {
+    ".parquet": pa.parquet.read_table,
+    ".csv": pa.csv.read_csv,
+}
 
 
 def _layout(folder: Path, table: pa.Table) -> Layout:
     path = folder / "layout.toml"
     if not path.exists():
-        named = {name.split("_")[0] for name in table.column_names if "_gyr_" in name}
-        known = [name for name in glove().names if name in named]
-        if not known:
-            raise ImportFolderError(
-                f"{folder}: samples name no sensor of the glove (SN1_gyr_x ...) and there is no "
-                "layout.toml.",
-                "Add a layout.toml that names the sensors. " + _GUIDE,
-            )
-        return glove("right", known)
+        return _glove_layout(folder, table)
     try:
         return _parse_layout(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError, KeyError, AttributeError) as error:
-        raise ImportFolderError(f"{path}: not a layout ({error!r}).", _GUIDE) from error
+    except (OSError, ValueError) as error:  # not readable, not UTF-8, not TOML, not a layout
+        raise ImportFolderError(f"{path}: not a layout ({error}).", _GUIDE) from error
     except LayoutError as error:
         raise ImportFolderError(f"{path}: {error.what}", error.remedy) from error
 
 
+def _glove_layout(folder: Path, table: pa.Table) -> Layout:
+    """The layout of a folder that does not bring one: the glove's sensors, and no others."""
+    named = {name.rpartition("_gyr_")[0] for name in table.column_names if "_gyr_" in name}
+    known = [name for name in (*glove().names, sensor_name(TIP_SENSOR)) if name in named]
+    unknown = sorted(named - set(known))
+    if unknown or not known:
+        raise ImportFolderError(
+            f"{folder}: there is no layout.toml, and "
+            + (f"the glove has no sensor {', '.join(unknown)}." if unknown else "no SN1_gyr_x ..."),
+            "Add a layout.toml that says where each sensor sits. " + _GUIDE,
+        )
+    return glove("right", known)
+
+
+class _LayoutFile(msgspec.Struct):
+    """What layout.toml holds."""
+
+    sensors: dict[str, str]
+    joints: tuple[JointPlace, ...] = ()
+    side: str = "unknown"
+
+
 def _parse_layout(document: dict[str, Any]) -> Layout:
-    sensors = tuple(SensorPlace(name, segment) for name, segment in document["sensors"].items())
-    joints = msgspec.convert(document.get("joints", []), tuple[JointPlace, ...])
-    return Layout(document.get("side", "unknown"), sensors, joints)
+    file = msgspec.convert(document, _LayoutFile)
+    sensors = tuple(SensorPlace(name, segment) for name, segment in file.sensors.items())
+    return Layout(file.side, sensors, file.joints)
 
 
 def _times(table: pa.Table, file: str) -> Array:
@@ -163,6 +192,11 @@ def _times(table: pa.Table, file: str) -> Array:
     if len(time_us) < 2:
         raise ImportFolderError(f"{file}: {len(time_us)} rows; at least 2 are needed.", _GUIDE)
     _refuse_nan(time_us, "time_s", file)
+    if np.abs(time_us).max() > _LATEST_US:
+        raise ImportFolderError(
+            f"{file}: time_s reaches {np.abs(time_us).max() * 1e-6:.3g}, which are no seconds.",
+            "Write time_s in seconds.",
+        )
     step = np.diff(time_us)
     if (step <= 0).any():
         row = int(np.argmax(step <= 0)) + 1
@@ -207,11 +241,22 @@ def _column(table: pa.Table, name: str, file: str) -> Array:
         raise ImportFolderError(f"{file}: no column {name}.", _GUIDE)
     try:
         return np.asarray(table[name].cast(pa.float64()).to_numpy(), dtype=np.float64)
-    except pa.ArrowInvalid as error:
+    except pa.ArrowException as error:
+        row, cell = _first_text(table[name])
         raise ImportFolderError(
-            f"{file}, column {name}: not all cells are numbers ({error}).",
+            f"{file}, row {row}, column {name}: {cell!r} is not a number.",
             "Write plain numbers with a decimal point.",
         ) from error
+
+
+def _first_text(column: pa.ChunkedArray) -> tuple[int, str]:
+    """Row and content of the first cell that is not a number; empty ones are missing numbers."""
+    for row, cell in enumerate(column.to_pylist(), start=1):
+        try:
+            float(cell or "nan")
+        except (TypeError, ValueError):
+            return row, str(cell)
+    return 1, str(column[0])
 
 
 def _refuse_nan(values: Array, name: str, file: str) -> None:
@@ -225,7 +270,8 @@ def _refuse_nan(values: Array, name: str, file: str) -> None:
         )
 
 
-def _labels(folder: Path) -> tuple[Label, ...]:
+def _labels(folder: Path, zero_s: float) -> tuple[Label, ...]:
+    """Labels, counted from the first instant instead of the folder's own time 0."""
     table = _table(folder, "labels")
     if table is None:
         return ()
@@ -241,7 +287,8 @@ def _labels(folder: Path) -> tuple[Label, ...]:
                 "Correct start_s and end_s.",
             )
     return tuple(
-        Label(float(a), float(b), name) for a, b, name in zip(starts, ends, names, strict=True)
+        Label(float(start) - zero_s, float(end) - zero_s, name)
+        for start, end, name in zip(starts, ends, names, strict=True)
     )
 
 
