@@ -6,18 +6,20 @@ One function, so that a folder of takes is a loop or a pool of processes.
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Literal, TypeAlias
 
 import msgspec
 import numpy as np
 
 from handstudio import __version__, pipeline
+from handstudio.arrays import Array
 from handstudio.errors import SetupError, TakeError
 from handstudio.pipeline import Motion
 from handstudio.recording.take import Take
@@ -61,15 +63,21 @@ def process(
     _refuse_other_sensors(take, chosen)
     from_start = from_start or chosen != take.header.setup
     folder = motion_folder(take, chosen, from_start)
-    if not (folder / "meta.json").exists():
+    motion = _opened(folder)
+    if motion is None:
         _compute(take, chosen, from_start, folder, progress or (lambda share: None))
-    return _open(folder)
+        motion = _opened(folder)
+    if motion is None:
+        raise TakeError(
+            f"{folder}: the motion does not stay as it was written.",
+            "Check the disk, then process the take again.",
+        )
+    return motion
 
 
-def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
-    """The motion of a take where it was computed before, else None."""
-    folder = motion_folder(take, setup or take.header.setup, from_start=False)
-    return _open(folder) if (folder / "meta.json").exists() else None
+def kept_motion(take: Take) -> Motion | None:
+    """The motion of a take where it was computed before and is whole, else None."""
+    return _opened(motion_folder(take, take.header.setup, from_start=False))
 
 
 def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:
@@ -116,7 +124,8 @@ class MotionWriter:
             file.close()
         meta = _Meta(self._count, self._sensors, __version__)
         (self._folder / "meta.json").write_bytes(msgspec.json.encode(meta))
-        if not folder.exists():  # somebody may have been faster: the same numbers
+        if _opened(folder) is None:  # else somebody was faster: the same numbers
+            shutil.rmtree(folder, ignore_errors=True)
             self._folder.rename(folder)
         self.discard()
 
@@ -152,14 +161,15 @@ def _fill(
     for batch in _batches(take.events(from_start)):
         motion, state = pipeline.run(setup, state, batch)
         writer.append(motion)
-        seen += sum(_size(event) for event in batch)
+        seen += sum(_size(event, take.header.kind) for event in batch)
         progress(min(1.0, seen / whole))
     progress(1.0)
 
 
-def _size(event: Event) -> int:
-    # about what an instant takes in the file, wire or samples: progress need not be exact
-    return len(event) * 18 * event.gyr.shape[1] if isinstance(event, ImuSamples) else 0
+def _size(event: Event, kind: Literal["wire", "samples"]) -> int:
+    """About what an event took in the file: progress need not be exact."""
+    per_sensor = 18 if kind == "wire" else 75
+    return len(event) * per_sensor * event.gyr.shape[1] if isinstance(event, ImuSamples) else 0
 
 
 def _first_state(take: Take, setup: Setup, from_start: bool) -> pipeline.State:
@@ -202,21 +212,25 @@ def _concatenated(run: list[ImuSamples]) -> ImuSamples:
     return ImuSamples(*(np.concatenate([getattr(part, name) for part in run]) for name in names))
 
 
-def _open(folder: Path) -> Motion:
-    meta = msgspec.json.decode((folder / "meta.json").read_bytes(), type=_Meta)
+def _opened(folder: Path) -> Motion | None:
+    """The motion kept in a folder; None where there is none, or not the whole of it."""
+    try:
+        meta = msgspec.json.decode((folder / "meta.json").read_bytes(), type=_Meta)
+        arrays = {name: _array(folder / name, kind, meta) for name, kind in _KINDS.items()}
+    except (OSError, ValueError):
+        return None
+    return Motion(**arrays)
+
+
+def _array(path: Path, kind: str, meta: _Meta) -> Array:
     n, s = meta.count, meta.sensors
-    shapes: dict[str, tuple[int, ...]] = {
+    shapes = {
         "time_us": (n,),
         "q_world_sensor": (n, s, 4),
         "q_world_start": (n, 4),
         "doubt": (n, s),
     }
-    arrays: dict[str, Any] = {
-        name: (
-            np.memmap(folder / name, dtype=kind, mode="r", shape=shapes[name])
-            if n
-            else np.empty(shapes[name], dtype=kind)
-        )
-        for name, kind in _KINDS.items()
-    }
-    return Motion(**arrays)
+    shape = shapes[path.name]
+    if path.stat().st_size != np.dtype(kind).itemsize * math.prod(shape):
+        raise ValueError(f"{path} is not of its size")
+    return np.memmap(path, dtype=kind, mode="r", shape=shape) if n else np.empty(shape, dtype=kind)
