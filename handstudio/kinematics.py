@@ -117,8 +117,7 @@ def relative_rotations(
             so3.conjugate(q_world_sensor[:, drivers[joint.parent]]),
             q_world_sensor[:, drivers[joint.child]],
         )
-        for joint in layout.joints
-        if joint.parent in drivers and joint.child in drivers
+        for joint in layout.instrumented_joints
     }
 
 

@@ -57,6 +57,12 @@ class Layout(msgspec.Struct, frozen=True):
         return drivers
 
     @property
+    def instrumented_joints(self) -> tuple[JointPlace, ...]:
+        """The joints with a sensor on both sides."""
+        drivers = self.drivers
+        return tuple(j for j in self.joints if {j.parent, j.child} <= drivers.keys())
+
+    @property
     def is_hand(self) -> bool:
         """Whether the hand views, joint angles by name and positions apply."""
         known = {joint.name for joint in JOINTS}
@@ -89,6 +95,7 @@ def check(layout: Layout) -> None:
         )
     _refuse_repeats("Sensor", layout.names)
     _refuse_repeats("Joint", [joint.name for joint in layout.joints])
+    _refuse_repeats("Sensor or joint", [*layout.names, *(joint.name for joint in layout.joints)])
     _refuse_repeats("Child segment", [joint.child for joint in layout.joints])
     joined = {s for joint in layout.joints for s in (joint.parent, joint.child)}
     for place in layout.sensors:

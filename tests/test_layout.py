@@ -101,6 +101,7 @@ CHAIN = (("j", "a", "b", 1), ("k", "b", "c", 2))
 FAULTS = {
     "The layout has no sensors": ({}, ()),
     "Joint j appears 2 times": ({"A": "a"}, (("j", "a", "b", 1), ("j", "b", "c", 1))),
+    "Sensor or joint j appears 2 times": ({"j": "a"}, (("j", "a", "b", 1),)),
     "Child segment b appears 2 times": ({"A": "a"}, (("j", "a", "b", 1), ("k", "c", "b", 1))),
     "A sits on d, which no joint joins": ({"A": "d"}, CHAIN),
     "Joint j has 4 axes, not 1, 2 or 3": ({"A": "a"}, (("j", "a", "b", 4),)),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import BinaryIO, Literal, TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -42,32 +43,30 @@ def export_csv(
     content: Content = "angles",
     window: Window | None = None,
 ) -> Path:
-    """Write a CSV file and its sidecar (``NAME.csv.json``).
+    """Write a CSV file and its sidecar (``NAME.csv.json``), both whole or not at all.
 
     Raises:
-        TakeError: the file cannot be written.
-        LayoutError: angles or positions of a take that has no hand.
+        TakeError: the window is empty, the take has no hand to give angles or positions of, or
+            the file cannot be written.
     """
     part = cut(motion, window or Window())
+    table = _table(setup, part, content)
+    unfinished = target.with_name(target.name + ".part")
+    sidecar = target.with_name(target.name + ".json")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with target.open("wb") as file:
-            write_csv(file, setup, part, content, start_us=int(motion.time_us[0]))
-        sidecar = target.with_name(target.name + ".json")
+        with unfinished.open("wb") as file:
+            _write(file, table, part, start_us=int(motion.time_us[0]))
         sidecar.write_bytes(metadata(take, setup, part, content))
+        unfinished.replace(target)
     except OSError as error:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
         raise TakeError(
             f"{target}: cannot be written ({error.strerror or error}).",
             "Choose another folder, or close the program that has the file open.",
         ) from error
     return target
-
-
-def csv_bytes(setup: Setup, motion: Motion, content: Content, window: Window) -> bytes:
-    """The same file in memory, for a browser's download."""
-    buffer = BytesIO()
-    write_csv(buffer, setup, cut(motion, window), content, start_us=int(motion.time_us[0]))
-    return buffer.getvalue()
 
 
 def cut(motion: Motion, window: Window) -> Motion:
@@ -78,73 +77,92 @@ def cut(motion: Motion, window: Window) -> Motion:
     """
     if len(motion) == 0:
         raise TakeError("The take holds no instant of motion.", "Record it again.")
-    time_s = (motion.time_us - motion.time_us[0]) * 1e-6
-    end_s = time_s[-1] if window.end_s is None else window.end_s
-    first = int(np.searchsorted(time_s, window.start_s, side="left"))
-    last = int(np.searchsorted(time_s, end_s, side="right"))
+    # whole microseconds: 0.1 s is an instant, 100000 times 1e-6 a little less
+    time_us = motion.time_us - motion.time_us[0]
+    whole_s = float(time_us[-1]) * 1e-6
+    end_s = whole_s if window.end_s is None else window.end_s
+    first = int(np.searchsorted(time_us, round(window.start_s * 1e6), side="left"))
+    last = int(np.searchsorted(time_us, round(end_s * 1e6), side="right"))
     if first >= last:
         raise TakeError(
             f"Nothing lies between {window.start_s:.2f} s and {end_s:.2f} s.",
-            f"Choose a window within 0 and {time_s[-1]:.2f} s.",
+            f"Choose a window within 0 and {whole_s:.2f} s.",
         )
     return motion[first:last]
 
 
-def write_csv(
-    file: BytesIO | object, setup: Setup, motion: Motion, content: Content, start_us: int
-) -> None:
-    """Write the rows of a motion; times count from ``start_us``."""
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """The columns between time and doubt: their names, and their values in any part of a motion."""
+
+    names: list[str]
+    values: Callable[[Motion], Array]
+
+
+def _write(file: BinaryIO, table: _Table, motion: Motion, start_us: int) -> None:
     options = pa.csv.WriteOptions(include_header=True, quoting_style="none")
-    names = _names(setup, motion, content)
+    names = ["time_s", *table.names, "doubtful_sensors"]
     schema = pa.schema([(name, pa.float64()) for name in names])
     with pa.csv.CSVWriter(file, schema, write_options=options) as writer:
         for at in range(0, len(motion), _BLOCK):
             part = motion[at : at + _BLOCK]
-            columns = _columns(setup, part, content, exported_of=motion)
+            columns = table.values(part)
             time_s = np.round((part.time_us - start_us) * 1e-6, 6)
             doubtful = (part.doubt != 0).sum(axis=1).astype(float)
             arrays = [pa.array(c) for c in (time_s, *columns.T, doubtful)]
             writer.write_table(pa.table(arrays, schema=schema))
 
 
-def _names(setup: Setup, motion: Motion, content: Content) -> list[str]:
+def _table(setup: Setup, motion: Motion, content: Content) -> _Table:
     match content:
-        case "angles":
-            if not setup.layout.is_hand:
-                raise_no_hand(setup)
-            middle = [f"{angle.name}_deg" for angle in exported_angles(setup, motion)]
-        case "positions":
-            if not setup.layout.is_hand:
-                raise_no_hand(setup)
-            points = [joint.name for joint in JOINTS] + [f"{finger}_tip" for finger in FINGERS]
-            middle = [f"{point}_{axis}_mm" for point in points for axis in "xyz"]
         case "orientations":
-            relative = relative_rotations(setup.layout, motion.q_world_sensor[:0])
-            things = [*setup.layout.names, *relative]
-            middle = [f"{thing}_q{part}" for thing in things for part in "wxyz"]
-    return ["time_s", *middle, "doubtful_sensors"]
-
-
-def _columns(setup: Setup, motion: Motion, content: Content, exported_of: Motion) -> Array:
-    """Values as written: degrees to 1e-4, quaternions to 1e-7, millimetres to 1e-3."""
-    match content:
+            return _orientations(setup)
+        case _ if not setup.layout.is_hand:
+            raise TakeError(
+                f"This take has no joint angles. {setup.layout.missing_for_hand}",
+                "Export orientations instead: they hold every sensor and the rotation across "
+                "each joint.",
+            )
         case "angles":
-            angles = exported_angles(setup, exported_of)
-            return np.round(np.rad2deg(angles_of(setup, motion, angles)), 4) + 0.0
+            return _angles(setup, motion)
         case "positions":
-            pose = pose_of(setup, motion.q_world_sensor)
-            points = np.concatenate([pose.t_world_joint, pose.t_world_tip], axis=1)
-            return np.round(points.reshape(len(motion), -1) * 1e3, 3) + 0.0
-        case "orientations":
-            relative = relative_rotations(setup.layout, motion.q_world_sensor)
-            across = [q[:, None] for q in relative.values()]
-            every = np.concatenate([motion.q_world_sensor, *across], axis=1)
-            return np.round(every.reshape(len(motion), -1), 7) + 0.0
+            return _positions(setup)
 
 
-def raise_no_hand(setup: Setup) -> None:
-    """Say why there are no angles and what to export instead."""
-    raise TakeError(
-        f"This take has no joint angles. {setup.layout.missing_for_hand}",
-        "Export orientations instead: they hold every sensor and the rotation across each joint.",
+def _angles(setup: Setup, motion: Motion) -> _Table:
+    """Degrees, to 1e-4."""
+    angles = exported_angles(setup, motion)
+    return _Table(
+        [f"{angle.name}_deg" for angle in angles],
+        lambda part: _rounded(np.rad2deg(angles_of(setup, part, angles)), 4),
     )
+
+
+def _positions(setup: Setup) -> _Table:
+    """Joints, then fingertips: millimetres, to 1e-3."""
+
+    def values(part: Motion) -> Array:
+        pose = pose_of(setup, part.q_world_sensor)
+        points = np.concatenate([pose.t_world_joint, pose.t_world_tip], axis=1)
+        return _rounded(points.reshape(len(part), -1) * 1e3, 3)
+
+    points = [joint.name for joint in JOINTS] + [f"{finger}_tip" for finger in FINGERS]
+    return _Table([f"{point}_{axis}_mm" for point in points for axis in "xyz"], values)
+
+
+def _orientations(setup: Setup) -> _Table:
+    """Sensors in the world, then children in their parents across joints: quaternions, to 1e-7."""
+
+    def values(part: Motion) -> Array:
+        relative = relative_rotations(setup.layout, part.q_world_sensor)
+        across = [q[:, None] for q in relative.values()]
+        every = np.concatenate([part.q_world_sensor, *across], axis=1)
+        return _rounded(every.reshape(len(part), -1), 7)
+
+    things = [*setup.layout.names, *(joint.name for joint in setup.layout.instrumented_joints)]
+    return _Table([f"{thing}_q{part}" for thing in things for part in "wxyz"], values)
+
+
+def _rounded(values: Array, digits: int) -> Array:
+    rounded: Array = np.round(values, digits) + 0.0  # no minus before a zero
+    return rounded

@@ -51,6 +51,8 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
             "relative to the forearm's attitude at the start (palm down), the upper arm assumed "
             "still: no sensor is on it"
         )
+    if content == "positions":
+        fields["origin"] = "the elbow, assumed still: its place cannot be observed"
     return msgspec.json.format(msgspec.json.encode(fields))
 
 

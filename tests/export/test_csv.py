@@ -1,0 +1,306 @@
+"""CSV exports, read back with other people's readers: the numbers of the motion, and where from."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pyarrow.csv
+import pytest
+
+from handstudio import __version__
+from handstudio.errors import TakeError
+from handstudio.export import csv as csv_module
+from handstudio.export.csv import Content, Window, export_csv
+from handstudio.hand.angles import ROOT_ANGLES
+from handstudio.hand.skeleton import FINGERS, JOINTS
+from handstudio.kinematics import angles_of, measured_angles, pose_of, relative_rotations
+from handstudio.layout import JointPlace, Layout, SensorPlace
+from handstudio.pipeline import Motion
+from handstudio.process import process
+from handstudio.recording.header import Header, Summary
+from handstudio.recording.simulated import simulate
+from handstudio.recording.take import Take, open_take
+from handstudio.recording.writer import TakeWriter
+from handstudio.setup import HandModel, Setup
+
+CONTENTS: tuple[Content, ...] = ("angles", "orientations", "positions")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> Take:
+    """Six seconds of a left virtual glove: rest, then the forearm raised and a fist begun."""
+    folder = tmp_path_factory.mktemp("recorded")
+    hand = HandModel(hand_length_m=0.175)
+    return open_take(simulate(folder, seconds=6.0, seed=1, side="left", hand=hand))
+
+
+@pytest.fixture(scope="module")
+def motion(recorded) -> Motion:
+    return process(recorded)
+
+
+@pytest.fixture
+def door(tmp_path) -> tuple[Take, Motion]:
+    """A take without a hand: two sensors of a door, one joint; the motion is made up."""
+    places = (SensorPlace("leaf, inner", "door"), SensorPlace("frame", "wall"))
+    layout = Layout("unknown", places, (JointPlace("hinge", "wall", "door", 1),))
+    header = Header("door", "S01", 10**18, Setup(layout, 50.0), "samples", "by hand")
+    take = open_take(TakeWriter(tmp_path / "door.mcap", header).close())
+    rng = np.random.default_rng(2)
+    q = rng.normal(size=(5, 2, 4))
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    doubt = np.array([[0, 0], [1, 0], [3, 8], [0, 4], [0, 0]], dtype=np.uint8)
+    time_us = np.array([5_000_000, 5_020_000, 5_040_001, 5_100_000, 5_120_000])
+    return take, Motion(time_us, q, np.full((5, 4), np.nan), doubt)
+
+
+def read(path: Path) -> tuple[list[str], np.ndarray]:
+    """With Python's own reader."""
+    with path.open(newline="", encoding="utf-8") as file:
+        names, *rows = list(csv.reader(file))
+    return names, np.array([[float(cell) for cell in row] for row in rows])
+
+
+def exported(
+    take: Take, motion: Motion, folder: Path, content: Content = "angles", **window: float
+) -> tuple[list[str], np.ndarray]:
+    chosen = Window(**window) if window else None
+    setup = take.header.setup
+    path = export_csv(take, setup, motion, folder / "out.csv", content=content, window=chosen)
+    return read(path)
+
+
+# --- the numbers ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_two_other_readers_read_the_same_table(recorded, motion, tmp_path, content):
+    names, values = exported(recorded, motion, tmp_path, content)
+    table = pyarrow.csv.read_csv(tmp_path / "out.csv")
+    assert table.column_names == names
+    assert len(set(names)) == len(names)
+    columns = [column.to_numpy().astype(float) for column in table.columns]
+    np.testing.assert_array_equal(np.stack(columns, axis=-1), values)
+
+
+def test_angles_are_those_of_the_hand_in_degrees(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path)
+    setup = recorded.header.setup
+    angles = measured_angles(setup.layout)
+    assert names == ["time_s", *(f"{a.name}_deg" for a in angles), "doubtful_sensors"]
+    expected = np.rad2deg(angles_of(setup, motion, angles))
+    np.testing.assert_allclose(values[:, 1:-1], expected, atol=0.50001e-4)
+    assert np.nanmax(np.abs(expected)) > 40.0
+    np.testing.assert_array_equal(np.isnan(values[:, 1:-1]), np.isnan(expected))
+    np.testing.assert_array_equal(values[:, 1:-1], np.round(values[:, 1:-1], 4))
+
+
+def test_orientations_are_those_of_the_sensors_and_across_the_joints(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, "orientations")
+    layout = recorded.header.setup.layout
+    across = relative_rotations(layout, motion.q_world_sensor)
+    assert len(across) == len(JOINTS) - 1
+    things = [*layout.names, *across]
+    assert names == ["time_s", *(f"{t}_q{p}" for t in things for p in "wxyz"), "doubtful_sensors"]
+    expected = np.concatenate([motion.q_world_sensor, np.stack(list(across.values()), 1)], axis=1)
+    np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-7)
+
+
+def test_positions_are_those_of_joints_and_fingertips_in_millimetres(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, "positions")
+    points = [*(joint.name for joint in JOINTS), *(f"{finger}_tip" for finger in FINGERS)]
+    assert names == ["time_s", *(f"{p}_{a}_mm" for p in points for a in "xyz"), "doubtful_sensors"]
+    pose = pose_of(recorded.header.setup, motion.q_world_sensor)
+    expected = np.concatenate([pose.t_world_joint, pose.t_world_tip], axis=1) * 1e3
+    np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-3)
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_time_counts_seconds_from_the_takes_first_instant(recorded, motion, tmp_path, content):
+    _, values = exported(recorded, motion, tmp_path, content)
+    time_s = (motion.time_us - motion.time_us[0]) / 1e6
+    np.testing.assert_allclose(values[:, 0], time_s, atol=1e-12)
+
+
+def test_doubtful_sensors_are_counted(recorded, motion, door, tmp_path):
+    _, values = exported(recorded, motion, tmp_path)
+    np.testing.assert_array_equal(values[:, -1], (motion.doubt != 0).sum(axis=1))
+    assert values[0, -1] == 20.0
+    _, values = exported(*door, tmp_path, "orientations")
+    assert values[:, -1].tolist() == [0.0, 1.0, 2.0, 1.0, 0.0]
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_how_many_rows_are_written_at_a_time_changes_no_byte(
+    recorded, motion, tmp_path, monkeypatch, content
+):
+    exported(recorded, motion, tmp_path, content)
+    whole = (tmp_path / "out.csv").read_bytes()
+    monkeypatch.setattr(csv_module, "_BLOCK", 97)
+    exported(recorded, motion, tmp_path, content)
+    assert (tmp_path / "out.csv").read_bytes() == whole
+    assert b"-0," not in whole
+
+
+# --- the window -------------------------------------------------------------------------------
+
+
+def test_a_window_holds_both_its_ends(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, start_s=1.0, end_s=2.5)
+    assert values[[0, -1], 0].tolist() == [1.0, 2.5]
+    assert len(values) == 151
+    all_names, whole = exported(recorded, motion, tmp_path)
+    assert names == all_names
+    np.testing.assert_array_equal(values, whole[100:251])
+
+
+@pytest.mark.parametrize(
+    ("window", "times"),
+    [
+        ({"start_s": 0.0, "end_s": 0.0}, [0.0]),
+        ({"start_s": 0.02, "end_s": 0.1}, [0.02, 0.040001, 0.1]),
+        ({"start_s": 0.1}, [0.1, 0.12]),
+        ({"start_s": -5.0, "end_s": 99.0}, [0.0, 0.02, 0.040001, 0.1, 0.12]),
+    ],
+)
+def test_a_window_is_in_time_and_not_in_rows(door, tmp_path, window, times):
+    _, values = exported(*door, tmp_path, "orientations", **window)
+    assert values[:, 0].tolist() == times
+
+
+@pytest.mark.parametrize("window", [{"start_s": 0.041, "end_s": 0.09}, {"start_s": 7.0}])
+def test_a_window_in_which_nothing_lies_says_where_there_is_something(door, tmp_path, window):
+    with pytest.raises(TakeError, match=r"Nothing lies between.*\n.*within 0 and 0\.12 s"):
+        exported(*door, tmp_path, "orientations", **window)
+    assert list(tmp_path.glob("out*")) == []
+
+
+def test_a_motion_of_nothing_is_not_exported(door, tmp_path):
+    take, motion = door
+    with pytest.raises(TakeError, match="no instant"):
+        exported(take, motion[:0], tmp_path, "orientations")
+
+
+# --- without a start, without a hand ----------------------------------------------------------
+
+
+def test_angles_from_the_start_are_absent_where_there_is_none(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, start_s=0.0, end_s=0.3)
+    assert not {f"{name}_deg" for name in ROOT_ANGLES} & set(names)
+    assert np.isfinite(values).all()
+    assert not any("elbow" in key for key in json.loads(sidecar(tmp_path)))
+
+
+def test_angles_from_the_start_are_told_as_such(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path)
+    assert names[1:3] == [f"{name}_deg" for name in ROOT_ANGLES]
+    placed = np.isfinite(motion.q_world_start[:, 0])
+    np.testing.assert_array_equal(np.isfinite(values[:, 1]), placed)
+    assert "upper arm assumed still" in json.loads(sidecar(tmp_path))[" and ".join(ROOT_ANGLES)]
+
+
+def test_a_take_without_a_hand_gives_orientations(door, tmp_path):
+    take, motion = door
+    names, values = exported(take, motion, tmp_path, "orientations")
+    things = ["leaf, inner", "frame", "hinge"]
+    assert names == ["time_s", *(f"{t}_q{p}" for t in things for p in "wxyz"), "doubtful_sensors"]
+    across = relative_rotations(take.header.setup.layout, motion.q_world_sensor)["hinge"]
+    np.testing.assert_allclose(values[:, 9:13], across, atol=0.50001e-7)
+
+
+@pytest.mark.parametrize("content", ["angles", "positions"])
+def test_a_take_without_a_hand_has_no_angles_and_leaves_no_file(door, tmp_path, content):
+    with pytest.raises(TakeError, match=r"no joint angles.*which hand.*\n.*orientations instead"):
+        exported(*door, tmp_path, content)
+    assert list(tmp_path.glob("out*")) == []
+
+
+# --- where it is from -------------------------------------------------------------------------
+
+
+def sidecar(folder: Path) -> str:
+    return (folder / "out.csv.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_every_export_says_where_it_is_from(recorded, motion, tmp_path, content):
+    exported(recorded, motion, tmp_path, content, start_s=1.0)
+    told = json.loads(sidecar(tmp_path))
+    header = recorded.header
+    assert told["content"] == content
+    assert told["subject"] == "virtual"
+    assert told["hand_side"] == "left"
+    assert told["hand_length_m"] == 0.175
+    assert list(told["sensor_map"].items()) == [
+        (place.sensor, place.segment) for place in header.setup.layout.sensors
+    ]
+    assert told["nominal_rate_hz"] == told["measured_rate_hz"] == 100.0
+    assert told["loss_percent"] == 0.0
+    assert told["calibration"] == header.setup.calibration
+    assert told["zero"] == header.setup.zero
+    assert "flexion (about x), deviation (about z), rotation (about y)" in told["convention"]
+    assert told["filter"]["type"] == "vqf"
+    assert told["software"] == f"handstudio {__version__}"
+    assert told["raw_file"] == recorded.path.name
+    assert told["raw_sha256"] == recorded.sha256()
+    start = datetime.fromisoformat(told["start_utc"])
+    assert abs((start - datetime.fromtimestamp(header.start_utc_ns / 1e9, UTC)).total_seconds()) < (
+        0.002
+    )
+    assert told["device"]["serial_number"] == "VG-1"
+
+
+def test_loss_and_measured_rate_are_what_they_were(recorded, motion, tmp_path):
+    header = recorded.header
+    writer = TakeWriter(tmp_path / "lossy.mcap", header)
+    lossy = open_take(writer.close(Summary(0, 0, 6.0, packets=975, missing=25)))
+    half = Motion(*(getattr(motion, name)[::2] for name in Motion.__slots__))
+    exported(lossy, half, tmp_path)
+    told = json.loads(sidecar(tmp_path))
+    assert told["loss_percent"] == 2.5
+    assert (told["nominal_rate_hz"], told["measured_rate_hz"]) == (100.0, 50.0)
+
+
+def test_what_nobody_knows_is_null(door, tmp_path):
+    take, motion = door
+    exported(take, motion[:1], tmp_path, "orientations")
+    told = json.loads(sidecar(tmp_path))
+    assert told["loss_percent"] is None
+    assert told["measured_rate_hz"] is None
+    assert told["device"] is None
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+def test_folders_are_made_and_an_export_before_is_replaced_whole(recorded, motion, tmp_path):
+    setup = recorded.header.setup
+    target = tmp_path / "a" / "b" / "out.csv"
+    export_csv(recorded, setup, motion, target)
+    export_csv(recorded, setup, motion, target, content="orientations")
+    assert read(target)[0][1] == "SN1_qw"
+    assert sorted(path.name for path in target.parent.iterdir()) == ["out.csv", "out.csv.json"]
+
+
+def test_a_file_that_cannot_be_written_is_named_and_the_one_before_stays(
+    recorded, motion, tmp_path, monkeypatch
+):
+    exported(recorded, motion, tmp_path)
+    before = (tmp_path / "out.csv").read_bytes()
+    monkeypatch.setattr(csv_module, "metadata", _full)
+    with pytest.raises(TakeError, match=r"out\.csv: cannot be written.*\n.*another folder"):
+        exported(recorded, motion, tmp_path, "positions")
+    assert (tmp_path / "out.csv").read_bytes() == before
+    assert list(tmp_path.glob("*.part")) == []
+    shutil.copy(tmp_path / "out.csv", tmp_path / "file")
+    with pytest.raises(TakeError, match="cannot be written"):
+        export_csv(recorded, recorded.header.setup, motion, tmp_path / "file" / "out.csv")
+
+
+def _full(*_: object) -> bytes:
+    raise OSError(28, "No space left on device")
