@@ -65,16 +65,16 @@ def main(
     with tempfile.TemporaryDirectory() as temporary:
         place = sessions or Path(temporary) / "sessions"
         broad = {
-            trial.stem: broad_trial(_imported(trial, broad_folder, place, "BROAD"))
+            trial.stem: broad_trial(imported(trial, broad_folder, place, "BROAD"))
             for trial in sorted((data / "broad").glob("*.mat"))
         }
         dfjimu = {
-            trial.stem: dfjimu_trial(_imported(trial, dfjimu_folder, place, "dfjimu"))
+            trial.stem: dfjimu_trial(imported(trial, dfjimu_folder, place, "dfjimu"))
             for trial in sorted((data / "dfjimu").glob("*.mat"))
         }
     figures = {
-        "broad": {"mean": _mean(broad), "trials": broad},
-        "dfjimu": {"mean": _mean(dfjimu), "trials": dfjimu},
+        "broad": {"mean": mean(broad), "trials": broad},
+        "dfjimu": {"mean": mean(dfjimu), "trials": dfjimu},
     }
     _show(broad, dfjimu)
     if json_file is not None:
@@ -109,9 +109,10 @@ def dfjimu_trial(compared: Compared) -> dict[str, float | None]:
     }
 
 
-def _imported(
+def imported(
     trial: Path, write: Callable[[Path, Path], None], sessions: Path, subject: str
 ) -> Compared:
+    """A trial as its maker left it, through import, take and process."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / trial.stem
         write(trial, folder)
@@ -132,7 +133,8 @@ def _labelled(compared: Compared, labels: tuple[Label, ...]) -> Array:
     return labelled
 
 
-def _mean(trials: dict[str, dict[str, float | None]]) -> dict[str, float | None]:
+def mean(trials: dict[str, dict[str, float | None]]) -> dict[str, float | None]:
+    """Mean over trials; null where one of them has none."""
     keys = next(iter(trials.values()), {})
     columns = {key: [trial[key] for trial in trials.values()] for key in keys}
     return {
@@ -147,7 +149,7 @@ def _show(broad: dict[str, dict[str, float | None]], dfjimu: dict[str, Any]) -> 
         ("dfjimu: relative orientation, RMSE [deg]", dfjimu, DFJIMU_REFERENCES),
     ):
         rows = [[name, *map(_figure, trial.values())] for name, trial in trials.items()]
-        rows.append(["mean of these", *map(_figure, _mean(trials).values())])
+        rows.append(["mean of these", *map(_figure, mean(trials).values())])
         rows.append(["reference, all trials there are", *map(_figure, references.values())])
         print_table(title, ["trial", *references], rows)
         out.print()
