@@ -105,6 +105,28 @@ class SetSpeed:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkIn:
+    """The part of the take that counts begins here."""
+
+
+@dataclass(frozen=True, slots=True)
+class MarkOut:
+    """The part of the take that counts ends here."""
+
+
+@dataclass(frozen=True, slots=True)
+class WholeTake:
+    """The whole take counts again."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetLoop:
+    """Whether playing begins again at the end."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Export:
     """Write a CSV into the library and send it to a page."""
 
@@ -116,6 +138,9 @@ class Export:
 class FaceForward:
     """Turn the picture so that the forearm points away from the viewer."""
 
+
+Move: TypeAlias = TogglePlay | Seek | Step | SetSpeed | MarkIn | MarkOut | WholeTake | SetLoop
+"""What moves through the open take."""
 
 Intent: TypeAlias = (
     FindDevices
@@ -133,6 +158,10 @@ Intent: TypeAlias = (
     | Seek
     | Step
     | SetSpeed
+    | MarkIn
+    | MarkOut
+    | WholeTake
+    | SetLoop
     | Export
     | FaceForward
 )

@@ -38,10 +38,10 @@ class Jobs:
         self._done.value = 0.0
         return self._pool.submit(_process, path)
 
-    def export(self, path: Path, target: Path, content: Content) -> Future[Path]:
-        """Write a CSV."""
+    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
+        """Write a CSV of a part of a take."""
         self._done.value = 0.0
-        return self._pool.submit(_export, path, target, content)
+        return self._pool.submit(_export, path, target, content, window)
 
     def close(self) -> None:
         """End; a job that runs is abandoned."""
@@ -66,7 +66,7 @@ def _process(path: Path) -> None:
     process(open_take(path), progress=_tell)
 
 
-def _export(path: Path, target: Path, content: Content) -> Path:
+def _export(path: Path, target: Path, content: Content, window: Window) -> Path:
     take = open_take(path)
     motion = process(take, progress=_tell)
-    return export_csv(take, take.header.setup, motion, target, content=content, window=Window())
+    return export_csv(take, take.header.setup, motion, target, content=content, window=window)

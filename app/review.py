@@ -31,6 +31,9 @@ class Review:
     at_s: float = 0.0
     playing: bool = False
     speed: float = 1.0
+    in_s: float = 0.0  # the part that is played and exported
+    out_s: float | None = None  # None: to the end
+    loop: bool = False
 
     @property
     def setup(self) -> Setup:
@@ -41,6 +44,11 @@ class Review:
     def duration_s(self) -> float:
         """Time of the last instant."""
         return float(self.time_s[-1])
+
+    @property
+    def end_s(self) -> float:
+        """Where the part that counts ends."""
+        return self.duration_s if self.out_s is None else self.out_s
 
     @property
     def index(self) -> int:
@@ -72,13 +80,15 @@ def opened(take: Take, motion: Motion) -> Review:
 
 
 def advanced(review: Review, elapsed_s: float) -> Review:
-    """Play on; stops at the end."""
+    """Play on; at the end of the part that counts it stops, or begins again."""
     if not review.playing:
         return review
     at = review.at_s + elapsed_s * review.speed
-    if at >= review.duration_s:
-        return replace(review, at_s=review.duration_s, playing=False)
-    return replace(review, at_s=at)
+    if at < review.end_s:
+        return replace(review, at_s=at)
+    if review.loop and review.end_s > review.in_s:
+        return replace(review, at_s=review.in_s)
+    return replace(review, at_s=review.end_s, playing=False)
 
 
 def sought(review: Review, at_s: float) -> Review:
@@ -93,8 +103,25 @@ def stepped(review: Review, instants: int) -> Review:
 
 
 def toggled(review: Review) -> Review:
-    """Play or pause; at the end playing begins again."""
-    at_end = review.at_s >= review.duration_s - 1e-9
-    if not review.playing and at_end:
-        return replace(review, at_s=0.0, playing=True)
+    """Play or pause; from outside the part that counts, or its end, it plays from its begin."""
+    inside = review.in_s <= review.at_s < review.end_s - 1e-9
+    if not review.playing and not inside:
+        return replace(review, at_s=review.in_s, playing=True)
     return replace(review, playing=not review.playing)
+
+
+def marked_in(review: Review) -> Review:
+    """The part that counts begins here; an end before it is forgotten."""
+    out_s = review.out_s if review.out_s is not None and review.out_s > review.at_s else None
+    return replace(review, in_s=review.at_s, out_s=out_s)
+
+
+def marked_out(review: Review) -> Review:
+    """The part that counts ends here; a begin after it is forgotten."""
+    in_s = review.in_s if review.in_s < review.at_s else 0.0
+    return replace(review, in_s=in_s, out_s=review.at_s)
+
+
+def whole(review: Review) -> Review:
+    """The whole take counts."""
+    return replace(review, in_s=0.0, out_s=None)

@@ -37,6 +37,7 @@ from handstudio.device.orders import (
     TakeDone,
 )
 from handstudio.errors import HandstudioError
+from handstudio.export.csv import Window
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.kinematics import segment_attitudes
 from handstudio.maths import so3
@@ -193,14 +194,10 @@ class Studio:
                 self._export(intents.Export(content, page))
             case intents.FaceForward():
                 self.state = replace(self.state, yaw=None)
-            case (
-                intents.TogglePlay() | intents.Seek() | intents.Step() | intents.SetSpeed()
-            ) as move:
-                self._move(move)
+            case _:
+                self._move(intent)
 
-    def _move(
-        self, move: intents.TogglePlay | intents.Seek | intents.Step | intents.SetSpeed
-    ) -> None:
+    def _move(self, move: intents.Move) -> None:
         review = self.state.review
         if review is None:
             return
@@ -213,6 +210,14 @@ class Studio:
                 review = reviewing.stepped(review, instants)
             case intents.SetSpeed(factor=factor):
                 review = replace(review, speed=factor)
+            case intents.MarkIn():
+                review = reviewing.marked_in(review)
+            case intents.MarkOut():
+                review = reviewing.marked_out(review)
+            case intents.WholeTake():
+                review = reviewing.whole(review)
+            case intents.SetLoop(on=on):
+                review = replace(review, loop=on)
         self.state = replace(self.state, review=review)
 
     def _find(self) -> None:
@@ -283,7 +288,8 @@ class Studio:
         path = review.take.path
         target = path.with_suffix(f".{order.content}.csv")
         words = _("Exporting {name}").format(name=target.name)
-        future = self.jobs.export(path, target, order.content)
+        window = Window(review.in_s, review.out_s)
+        future = self.jobs.export(path, target, order.content, window)
         self._pending.append(_Pending(future, _SendFile(order.page), words))
 
     # --- reports --------------------------------------------------------------------------------

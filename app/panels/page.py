@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 
 import viser
+from viser._messages import HotkeyKey
 
 from app import intents, view
 from app.panels.base import Send, put
@@ -91,17 +93,24 @@ _CAPTION = "font-size:.8rem;padding:0 .75em .5em;opacity:.75"
 
 def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
     """Keys and palette for what one does twice."""
-    record = gui.add_command(_("Record or stop"), hotkey="R", icon=viser.Icon.PLAYER_RECORD)
-    record.on_trigger(lambda _event: send(intents.ToggleRecording()))
-    play = gui.add_command(_("Play or pause"), hotkey="space", icon=viser.Icon.PLAYER_PLAY)
-    play.on_trigger(lambda _event: send(intents.TogglePlay()))
-    on = gui.add_command(_("One instant on"), hotkey="arrowright")
-    on.on_trigger(lambda _event: send(intents.Step(1)))
-    back = gui.add_command(_("One instant back"), hotkey="arrowleft")
-    back.on_trigger(lambda _event: send(intents.Step(-1)))
-    live = gui.add_command(_("Back to the live hand"), hotkey="L", icon=viser.Icon.HAND_STOP)
-    live.on_trigger(lambda _event: send(intents.ShowLive()))
-    face = gui.add_command(_("Turn the forearm away from me"), hotkey="F")
-    face.on_trigger(lambda _event: send(intents.FaceForward()))
+    commands: tuple[tuple[str, HotkeyKey, intents.Intent], ...] = (
+        (_("Record or stop"), "R", intents.ToggleRecording()),
+        (_("Play or pause"), "space", intents.TogglePlay()),
+        (_("One instant on"), "arrowright", intents.Step(1)),
+        (_("One instant back"), "arrowleft", intents.Step(-1)),
+        (_("Ten instants on"), "arrowup", intents.Step(10)),
+        (_("Ten instants back"), "arrowdown", intents.Step(-10)),
+        (_("The part begins here"), "I", intents.MarkIn()),
+        (_("The part ends here"), "O", intents.MarkOut()),
+        (_("The whole take again"), "W", intents.WholeTake()),
+        (_("Back to the live hand"), "L", intents.ShowLive()),
+        (_("Turn the forearm away from me"), "F", intents.FaceForward()),
+    )
+    for label, key, intent in commands:
+        gui.add_command(label, hotkey=key).on_trigger(_sending(send, intent))
     export = gui.add_command(_("Export CSV of the open take"), hotkey="E")
     export.on_trigger(library.export)
+
+
+def _sending(send: Send, intent: intents.Intent) -> Callable[[object], None]:
+    return lambda _event: send(intent)

@@ -29,8 +29,14 @@ class TransportPanel:
             )
             labels = tuple(f"{speed:g}x" for speed in SPEEDS)
             self._speed = gui.add_dropdown(_("Speed"), labels, initial_value="1x")
+            self._window = gui.add_button_group(
+                _("Part"),
+                (_("Begin here"), _("End here"), _("Whole")),
+                hint=_("The part that is played and exported; keys: I, O, W"),
+            )
+            self._loop = gui.add_checkbox(_("Loop"), initial_value=False)
             self._live = gui.add_button(_("Back to the live hand"), icon=viser.Icon.HAND_STOP)
-        self._panel.float(x=16.0, y=-16.0, width=400.0, height=228.0)
+        self._panel.float(x=16.0, y=-16.0, width=400.0, height=290.0)
         self._playing = False
         self._written = 0.0
         self._time.on_update(
@@ -39,6 +45,17 @@ class TransportPanel:
         self._play.on_click(lambda _event: send(intents.TogglePlay()))
         self._live.on_click(lambda _event: send(intents.ShowLive()))
         self._speed.on_update(lambda event: _set_speed(event, send))
+        self._loop.on_update(
+            lambda event: send(intents.SetLoop(event.target.value)) if event.client else None
+        )
+        parts: dict[str, intents.Intent] = dict(
+            zip(
+                self._window.options,
+                (intents.MarkIn(), intents.MarkOut(), intents.WholeTake()),
+                strict=True,
+            )
+        )
+        self._window.on_click(lambda event: send(parts[event.target.value]))
 
     def render(self, state: State) -> None:
         """Show where in the take we are."""
@@ -59,6 +76,10 @@ class TransportPanel:
             self._written = at
             put(self._time, value=at)
         here = f"{clock_of(review.at_s)} / {clock_of(review.duration_s)}"
+        if review.in_s > 0.0 or review.out_s is not None:
+            here += " · " + _("part {begin} to {end}").format(
+                begin=clock_of(review.in_s), end=clock_of(review.end_s)
+            )
         put(self._clock, content=here)
         if review.playing != self._playing:
             self._playing = review.playing
@@ -66,6 +87,7 @@ class TransportPanel:
             icon = viser.Icon.PLAYER_PAUSE if review.playing else viser.Icon.PLAYER_PLAY
             self._play.icon = icon
         put(self._speed, value=f"{review.speed:g}x")
+        put(self._loop, value=review.loop)
 
 
 def _set_speed(event: Any, send: Send) -> None:

@@ -66,3 +66,27 @@ def test_the_instant_shown_is_the_one_of_its_time(review: Review) -> None:
 def test_a_take_in_which_nothing_was_received_says_so(take: Take) -> None:
     with pytest.raises(TakeError, match="no instant"):
         reviewing.opened(take, empty(20))
+
+
+def test_only_the_part_that_counts_is_played(review: Review) -> None:
+    part = reviewing.marked_in(reviewing.sought(review, 2.0))
+    part = reviewing.marked_out(reviewing.sought(part, 3.0))
+    playing = reviewing.toggled(part)
+    assert playing.at_s == 2.0, "from its begin, whose end we stand on"
+    ended = reviewing.advanced(playing, 5.0)
+    assert ended.at_s == 3.0
+    assert not ended.playing
+    looping = reviewing.advanced(replace(playing, loop=True), 5.0)
+    assert looping.at_s == 2.0
+    assert looping.playing
+    assert reviewing.whole(part).end_s == review.duration_s
+
+
+def test_a_part_never_ends_before_it_begins(review: Review) -> None:
+    part = reviewing.marked_out(reviewing.sought(review, 2.0))
+    part = reviewing.marked_in(reviewing.sought(part, 3.0))
+    assert part.in_s == 3.0
+    assert part.end_s == review.duration_s
+    part = reviewing.marked_out(reviewing.sought(part, 1.0))
+    assert part.in_s == 0.0
+    assert part.end_s == 1.0

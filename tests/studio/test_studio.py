@@ -27,7 +27,7 @@ from handstudio.device.orders import (
     TakeDone,
 )
 from handstudio.errors import DeviceError
-from handstudio.export.csv import Content, export_csv
+from handstudio.export.csv import Content, Window, export_csv
 from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.simulated import simulate
@@ -63,10 +63,10 @@ class PromptJobs:
     def process(self, path: Path) -> Future[None]:
         return done(lambda: process(open_take(path)))
 
-    def export(self, path: Path, target: Path, content: Content) -> Future[Path]:
+    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
         take = open_take(path)
-        motion = process(take)
-        return done(lambda: export_csv(take, take.header.setup, motion, target, content=content))
+        motion, setup = process(take), take.header.setup
+        return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
 
 
 def done(work: Callable[[], Any]) -> Future[Any]:
@@ -147,6 +147,17 @@ def test_export_writes_the_file_and_sends_it_to_the_page_that_asked(studio: Stud
     state = after(studio, intents.Export("angles", page=5))
     assert [download.page for download in state.downloads] == [5]
     assert state.downloads[0].path.read_bytes().startswith(b'"time_s"')
+
+
+def test_export_holds_exactly_the_part_that_counts(studio: Studio) -> None:
+    path = simulate(studio.state.sessions, seconds=4.0)
+    after(studio, intents.OpenTake(path))
+    after(studio, intents.Seek(1.0), intents.MarkIn())
+    state = after(studio, intents.Seek(2.5), intents.MarkOut(), intents.Export("angles", page=1))
+    rows = state.downloads[0].path.read_text(encoding="utf-8").splitlines()[1:]
+    times = [float(row.split(",")[0]) for row in rows]
+    assert times[0] == pytest.approx(1.0, abs=0.006)
+    assert times[-1] == pytest.approx(2.5, abs=0.006)
 
 
 def test_a_damaged_take_is_explained_and_the_studio_goes_on(studio: Studio) -> None:
