@@ -280,7 +280,7 @@ def test_memory_does_not_grow_with_the_length_of_a_take(tmp_path):
 
 @pytest.mark.parametrize("kind", ["wire", "samples"])
 def test_progress_goes_steadily_from_nothing_to_all(kind, take, tmp_path, monkeypatch):
-    monkeypatch.setattr(process_module, "_BATCH", 50)
+    monkeypatch.setattr(process_module, "_BATCH", 25)
     told: list[float] = []
     one = take if kind == "wire" else long_take(tmp_path / "long.mcap", 10_000)
     process(one, progress=told.append)
