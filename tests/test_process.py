@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -17,6 +18,9 @@ from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.layout import Layout, SensorPlace, glove
 from handstudio.pipeline import Doubt, Motion
 from handstudio.process import kept_motion, process
+from handstudio.protocol.codec import encode
+from handstudio.protocol.decoder import V1Decoder
+from handstudio.protocol.packets import ImuPacket
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.simulated import simulate
 from handstudio.recording.take import FirstState, Take, open_take, pack_first_state
@@ -64,6 +68,24 @@ def cache_of(take: Take) -> Path:
 
 def test_a_processed_take_is_its_events_through_the_pipeline(take):
     same(process(take), at_once(take))
+
+
+def test_a_take_with_losses_and_a_restart_is_its_events_too(take, tmp_path):
+    chunks = list(take.chunks())
+    writer = TakeWriter(tmp_path / "lossy.mcap", take.header)
+    for k, chunk in enumerate(chunks):
+        if k not in (7, 20, 21, 40):
+            writer.write(*chunk)
+    for arrival_ns, chunk in chunks[:5]:
+        packets = [p for p in V1Decoder().feed(chunk) if isinstance(p, ImuPacket)]
+        anew = b"".join(encode(replace(packet, epoch=packet.epoch + 1)) for packet in packets)
+        writer.write(arrival_ns + 5_000_000_000, anew)
+    lossy = open_take(writer.close())
+    motion = process(lossy)
+    same(motion, at_once(lossy))
+    assert (np.diff(motion.time_us) > 0).all()
+    assert (motion.doubt & Doubt.AFTER_GAP).any(axis=1).sum() == 3
+    assert (np.diff(motion.time_us) > 1_000_000).sum() == 1  # of silence
 
 
 def test_what_was_computed_once_is_found_and_not_computed_again(take, monkeypatch):
