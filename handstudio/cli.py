@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +18,7 @@ import tyro
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Phase, StartTake, StopTake
-from handstudio.errors import DeviceError, HandstudioError
+from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
 from handstudio.process import process as process_take
@@ -27,7 +29,7 @@ from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.take import Take, open_take
 from handstudio.setup import HandModel, filter_named
-from handstudio.shell import out, print_error, print_json, print_table, progress
+from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 Sessions = Annotated[
     Path | None, tyro.conf.arg(help="Folder of the takes (default: ./sessions in a checkout)")
@@ -36,6 +38,9 @@ Json = Annotated[bool, tyro.conf.arg(help="Print JSON for a program instead of w
 TakeFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TAKE.mcap")]
 
 CONNECT_S = 25.0
+
+HAND_MM = (50.0, 400.0)
+"""Lengths that a hand may have, and metres or inches have not."""
 
 
 def studio(
@@ -98,27 +103,34 @@ def record(
         sessions: Folder of the takes.
         json: Print JSON for a program instead of words.
     """
+    if seconds is not None and not seconds > 0.0:
+        raise TakeError(f"A take of {seconds:g} s holds nothing.", "Choose more than 0 seconds.")
+    hand = _hand(hand_length_mm)
     path = library.new_take_path(
         library.sessions_folder(sessions), subject, name, datetime.now().astimezone()
     )
     capture = Capture()
     capture.start()
     try:
-        capture.send(Connect(address, HandModel(hand_length_m=hand_length_mm * 1e-3)))
-        _await_stream(capture)
-        capture.send(StartTake(path, subject))
-        _record_for(capture, seconds, json)
+        with _ended_by_signals():
+            capture.send(Connect(address, hand))
+            _await_stream(capture)
+            capture.send(StartTake(path, subject))
+            _record_for(capture, seconds, json)
     finally:
         capture.send(StopTake())
         capture.stop()
-    for report in capture.reports():
-        if isinstance(report, HandstudioError):
-            raise report
+    _raise_what_failed(capture)
     return _tell_take(open_take(path), json)
 
 
 def info(take: TakeFile, *, json: Json = False) -> int:
-    """Say what a take holds."""
+    """Say what a take holds.
+
+    Args:
+        take: The take.
+        json: Print JSON for a program instead of words.
+    """
     return _tell_take(open_take(take), json)
 
 
@@ -139,6 +151,8 @@ def process(
         csv: Also write the joint angles (orientations, where there is no hand) beside each take.
         json: Print JSON for a program instead of words.
     """
+    if not takes:
+        raise TakeError("No take was named.", "Name them: handstudio process TAKE.mcap ...")
     results = []
     for path in takes:
         take = open_take(path)
@@ -206,14 +220,19 @@ def import_(
         hand_length_mm: Wrist crease to the tip of the middle finger.
         sessions: Folder of the takes.
     """
-    hand = HandModel(hand_length_m=hand_length_mm * 1e-3)
+    hand = _hand(hand_length_mm)
     path = import_folder(folder, library.sessions_folder(sessions), subject, name, hand)
     out.print(str(path))
     return 0
 
 
 def recover(file: Annotated[Path, tyro.conf.Positional], *, json: Json = False) -> int:
-    """Get back all that was saved of an interrupted or damaged recording, as a new take."""
+    """Get back all that was saved of an interrupted or damaged recording, as a new take.
+
+    Args:
+        file: The recording; it stays as it is.
+        json: Print JSON for a program instead of words.
+    """
     got = recover_file(file)
     if json:
         print_json({**asdict(got), "path": str(got.path)})
@@ -247,7 +266,7 @@ def simulate(
         rate_hz=rate,
         seed=seed,
         side=side,
-        hand=HandModel(hand_length_m=hand_length_mm * 1e-3),
+        hand=_hand(hand_length_mm),
     )
     out.print(str(path))
     return 0
@@ -284,6 +303,35 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code)
 
 
+def _hand(length_mm: float) -> HandModel:
+    shortest, longest = HAND_MM
+    if not shortest <= length_mm <= longest:
+        raise SetupError(
+            f"A hand is not {length_mm:g} mm long.",
+            "Give it in millimetres, from the wrist crease to the tip of the middle finger: "
+            f"{shortest:g} to {longest:g}.",
+        )
+    return HandModel(hand_length_m=length_mm * 1e-3)
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """A shutdown or a closed terminal ends a take as Ctrl-C does."""
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    numbers = [number for name in names if _is_free(number := getattr(signal, name))]
+    for number in numbers:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _is_free(number: int) -> bool:
+    return signal.getsignal(number) is signal.SIG_DFL  # nohup ignores a closed terminal
+
+
 def _await_stream(capture: Capture) -> None:
     end = time.monotonic() + CONNECT_S
     while capture.newest.phase is not Phase.STREAMING:
@@ -304,9 +352,18 @@ def _record_for(capture: Capture, seconds: float | None, quiet: bool) -> None:
         try:
             while seconds is None or time.monotonic() - began < seconds:
                 share((time.monotonic() - began) / seconds if seconds else 0.0)
+                _raise_what_failed(capture)
                 time.sleep(0.05)
         except KeyboardInterrupt:
-            out.print("Ending the take.")
+            err.print("Ending the take.")
+
+
+def _raise_what_failed(capture: Capture) -> None:
+    for report in capture.reports():
+        if isinstance(report, HandstudioError):
+            raise report
+    if capture.newest.phase is Phase.FAILED and capture.newest.problem is not None:
+        raise capture.newest.problem
 
 
 def _tell_take(take: Take, json: bool) -> int:

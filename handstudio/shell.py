@@ -11,12 +11,14 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from handstudio.errors import HandstudioError
 from handstudio.process import Progress as ProgressCallback
 
-out = Console(highlight=False, soft_wrap=True)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
+# what is printed is what people named their folders: never markup
+out = Console(highlight=False, soft_wrap=True, markup=False, emoji=False)
+err = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def print_json(value: Any) -> None:
@@ -36,17 +38,15 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
 
 def print_error(error: HandstudioError) -> None:
     """What happened, and what to do next."""
-    err.print(f"[bold red]{_plain(error.what)}[/]\n{_plain(error.remedy)}")
+    err.print(Text(error.what, style="bold red"))
+    err.print(Text(error.remedy))
 
 
 @contextmanager
 def progress(words: str, quiet: bool = False) -> Iterator[ProgressCallback]:
     """A progress bar on standard error, where that is a terminal."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    words_as_they_are = TextColumn("{task.description}", markup=False)
+    columns = (words_as_they_are, BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=err, disable=quiet or not err.is_terminal) as bar:
         task = bar.add_task(words, total=1.0)
         yield lambda share: bar.update(task, completed=share)
-
-
-def _plain(text: str) -> str:
-    return text.replace("[", r"\[")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handstudio.errors import SetupError
 from handstudio.hand.skeleton import HandSide, nominal_skeleton
 from handstudio.layout import glove
 from handstudio.protocol.codec import encode
@@ -19,7 +20,7 @@ from handstudio.recording.header import Header, Summary
 from handstudio.recording.library import new_take_path
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import HandModel, for_device
-from handstudio.simulation.firmware import Firmware
+from handstudio.simulation.firmware import RATES_HZ, Firmware
 from handstudio.simulation.glove import WornGlove, description
 from handstudio.simulation.rig import signals
 from handstudio.simulation.showcase import showcase
@@ -42,8 +43,10 @@ def simulate(
     """Write a take of the showcase, and its truth.
 
     Raises:
+        SetupError: no glove has this rate, or there is no time to simulate.
         TakeError: the take cannot be written.
     """
+    _refuse(seconds, rate_hz)
     hand = hand or HandModel()
     told = description(side, seed, rate_hz, epoch=seed + 1, name="Virtual glove")
     start = datetime.now(UTC)
@@ -64,6 +67,14 @@ def simulate(
 def truth_path(take: Path) -> Path:
     """Where the truth of a simulated take lives."""
     return take.with_suffix(".truth.npz")
+
+
+def _refuse(seconds: float, rate_hz: int) -> None:
+    if rate_hz not in RATES_HZ:
+        rates = ", ".join(str(rate) for rate in RATES_HZ)
+        raise SetupError(f"No virtual glove has a rate of {rate_hz} Hz.", f"Choose one of {rates}.")
+    if not seconds > 0.0:
+        raise SetupError(f"A take of {seconds:g} s holds nothing.", "Choose more than 0 s.")
 
 
 def _write(writer: TakeWriter, glove: Firmware, seconds: float, start_ns: int) -> np.ndarray:
