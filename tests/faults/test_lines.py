@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handstudio.device import capture as capture_module
 from handstudio.device.capture import INTRODUCTION_S
 from handstudio.device.orders import Connect, Phase, StopTake
 from handstudio.errors import DeviceError, LayoutError
@@ -56,14 +57,19 @@ def test_a_port_that_says_anything_but_what_we_understand_is_refused(studio, por
     assert "another port" in problem.remedy
 
 
-def test_a_port_that_says_nothing_is_refused(studio, port):
+@pytest.fixture
+def hurry(monkeypatch) -> None:
+    monkeypatch.setattr(capture_module, "INTRODUCTION_S", 1.0)
+
+
+def test_a_port_that_says_nothing_is_refused(studio, port, hurry):
     far_end = port()
     problem = failure(studio, far_end.address, INTRODUCTION_S + SLACK_S)
     assert isinstance(problem, DeviceError)
     assert "nothing came" in problem.what
 
 
-def test_a_port_that_repeats_what_we_say_is_refused(studio, port):
+def test_a_port_that_repeats_what_we_say_is_refused(studio, port, hurry):
     far_end = port()
     far_end.keep_saying(far_end.hear)
     problem = failure(studio, far_end.address, INTRODUCTION_S + SLACK_S)
