@@ -204,7 +204,7 @@ def test(options: list[str]) -> int:
         "ruff format": ["ruff", "format", "--check", "."],
         "mypy": ["mypy"],
         "lint-imports": ["lint-imports"],
-        "pytest": ["pytest", "-n", "2", *options],
+        "pytest": ["pytest", "-n", "2", "--dist", "loadgroup", *options],
     }
     failed = []
     for name, (program, *rest) in checks.items():
