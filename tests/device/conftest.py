@@ -251,9 +251,10 @@ class Port:
 
     def unplug(self) -> None:
         """Take the port away."""
-        self.hang_up()
+        self._off.set()
         if self._thread is not None:
             self._thread.join()
+        self.hang_up()
 
     def hang_up(self) -> None:
         """The same, from within what is said."""
