@@ -17,7 +17,7 @@ import tyro
 
 from handstudio.device import find
 from handstudio.device.capture import Capture
-from handstudio.device.orders import Connect, Phase, StartTake, StopTake
+from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
@@ -350,12 +350,22 @@ def _record_for(capture: Capture, seconds: float | None, quiet: bool) -> None:
     began = time.monotonic()
     with progress(words, quiet) as share:
         try:
+            there = True
             while seconds is None or time.monotonic() - began < seconds:
                 share((time.monotonic() - began) / seconds if seconds else 0.0)
                 _raise_what_failed(capture)
+                there = _tell_whether_there(capture.newest, there)
                 time.sleep(0.05)
         except KeyboardInterrupt:
             err.print("Ending the take.")
+
+
+def _tell_whether_there(newest: Newest, before: bool) -> bool:
+    there = newest.phase is Phase.STREAMING
+    if there != before:
+        lost = f"{newest.address} is lost: looking for it. The take goes on when it is back."
+        err.print(f"{newest.address} is back." if there else lost)
+    return there
 
 
 def _raise_what_failed(capture: Capture) -> None:

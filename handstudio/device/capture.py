@@ -234,12 +234,22 @@ class Capture:
                 self._lose()
             elif now - line.moved > self._patience_s:
                 self._ask_again(Command.START)
+                self._say_that_it_rests(now - line.moved)
         elif now - line.opened <= INTRODUCTION_S:
             self._ask_again(Command.DESCRIBE)
         elif self._wanted and self._wanted.was_there:
             self._lose()
         else:
             self._refuse(line)
+
+    def _say_that_it_rests(self, still_s: float) -> None:
+        if still_s > INTRODUCTION_S and self.newest.problem is None:
+            glove = _serial_number(self.newest.setup)
+            problem = DeviceError(
+                f"{glove} is there but sends no motion; it is asked to twice a second.",
+                "Switch the glove off and on.",
+            )
+            self.newest = replace(self.newest, problem=problem)
 
     @property
     def _patience_s(self) -> float:

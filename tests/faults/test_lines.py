@@ -162,6 +162,18 @@ def test_a_glove_that_streams_but_is_not_asked_who_it_is_is_asked(studio, played
     studio.check(studio.stop_take())
 
 
+def test_a_glove_that_is_there_but_never_moves_is_said_to_be_so(studio, played, hurry):
+    played.streams = False
+    studio.send(Connect(played.address))
+    newest = studio.until(lambda newest: newest.problem is not None, "the problem is shown")
+    assert newest.phase is Phase.CONNECTING
+    assert "VG-0 is there but sends no motion" in newest.problem.what
+    assert newest.problem.remedy
+    played.streams = True
+    newest = studio.until(lambda newest: newest.phase is Phase.STREAMING, "it streams")
+    assert newest.problem is None
+
+
 def test_a_restart_without_a_word_is_followed_by_the_question_who_it_is(studio, played):
     studio.connect(played.address)
     studio.start_take()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -30,13 +31,17 @@ def recording(begun, sessions: Path, *more: str):
     """A recording that has gone on for a while."""
     address = f"virtual:?name={name_of(sessions.parent)}"
     running = begun("record", address, "--sessions", sessions, *more)
+    await_file(sessions, running)
+    time.sleep(0.7)
+    return running
+
+
+def await_file(sessions: Path, running) -> None:
     end = time.monotonic() + WITHIN_S
     while not list(sessions.rglob("*.mcap.recording")):
         assert time.monotonic() < end
         assert running.poll() is None, running.communicate()
         time.sleep(0.02)
-    time.sleep(0.7)
-    return running
 
 
 @pytest.mark.parametrize(
@@ -68,6 +73,27 @@ def test_a_signal_ends_the_take_whole(begun, running, tmp_path, name, whom):
     packets = [packet for _, chunk in take.chunks() for packet in decoder.feed(chunk)]
     assert not [packet for packet in packets if isinstance(packet, Restart)]
     assert running(name_of(tmp_path)) == []
+
+
+def test_a_glove_that_goes_and_comes_back_is_told_of(begun, tmp_path):
+    link = tmp_path / "glove"
+    command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--link", str(link)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as glove:
+        assert glove.stdout is not None
+        glove.stdout.readline()
+        recorder = begun("record", f"serial:{link}", "--sessions", tmp_path, "--json")
+        assert recorder.stderr is not None
+        await_file(tmp_path, recorder)
+        glove.kill()
+        link.unlink()
+    assert "is lost" in recorder.stderr.readline()
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as glove:
+        assert f"serial:{link} is back" in recorder.stderr.readline()
+        recorder.send_signal(signal.SIGINT)
+        out, _ = recorder.communicate(timeout=WITHIN_S)
+        glove.terminate()
+    assert recorder.returncode == 0
+    assert open_take(Path(msgspec.json.decode(out)["path"])).summary is not None
 
 
 def test_a_program_gets_its_json_alone(begun, tmp_path):
