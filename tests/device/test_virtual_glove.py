@@ -172,7 +172,7 @@ def test_a_host_that_sleeps_loses_what_the_glove_says_it_dropped(started, connec
     host.ask(Command.START)
     heard = host.listen(0.3)
     time.sleep(1.0)
-    heard += host.listen(1.6)
+    heard += host.until(lambda packets: bool(only(Health, packets)))
     assert only(Corruption, heard) == []
     instants, health = only(ImuPacket, heard), only(Health, heard)[-1]
     clocks = np.array([packet.clock_us for packet in instants])
