@@ -112,7 +112,7 @@ def _sensor_plots(layout: Layout) -> tuple[Plot, ...]:
         Plot(name, tuple(Curve(part, colours.of_index(i)) for i, part in enumerate(parts)))
         for name in layout.names[:_MOST_SENSORS]
     ]
-    across = [j.name for j in layout.joints if {j.parent, j.child} <= layout.drivers.keys()]
+    across = [joint.name for joint in layout.instrumented_joints]
     if across:
         curves = tuple(Curve(name, colours.of_index(i)) for i, name in enumerate(across))
         plots.append(Plot(_("Turn across the joint"), curves))
