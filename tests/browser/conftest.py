@@ -32,16 +32,6 @@ CHROMIUM_ARGUMENTS = [
 expect.set_options(timeout=20_000)  # software rendering on two busy cores
 
 
-HERE = Path(__file__).parent
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """One worker for all of these: two software-rendered pages at once leave nothing to others."""
-    for item in items:
-        if HERE in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group("browser"))
-
-
 @dataclass(frozen=True)
 class RunningStudio:
     """A studio that serves."""

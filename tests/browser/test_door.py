@@ -12,7 +12,8 @@ from websockets.sync.client import connect
 
 from .conftest import RunningStudio, Start
 
-pytestmark = pytest.mark.browser
+# one worker for all: two software-rendered pages at once leave nothing to others
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
 
 
 @pytest.fixture
