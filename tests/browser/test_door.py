@@ -12,8 +12,7 @@ from websockets.sync.client import connect
 
 from .conftest import RunningStudio, Start
 
-# one worker for all: two software-rendered pages at once leave nothing to others
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture

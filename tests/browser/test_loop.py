@@ -19,8 +19,7 @@ from app.view import clock_of
 
 from .conftest import COMMAND, RunningStudio, Start
 
-# one worker for all: two software-rendered pages at once leave nothing to others
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
+pytestmark = pytest.mark.browser
 
 CENTRE = {"x": 340, "y": 240, "width": 650, "height": 390}  # between notices and transport
 

@@ -19,8 +19,7 @@ from handstudio.recording.take import open_take
 from .conftest import Start, free_port, glove
 from .test_loop import button, moves_within, scrub_to
 
-# one worker for all: two software-rendered pages at once leave nothing to others
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
+pytestmark = pytest.mark.browser
 
 
 def test_without_a_device_it_says_what_to_do(
