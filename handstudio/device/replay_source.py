@@ -18,6 +18,10 @@ from handstudio.recording.take import Take, open_take
 from handstudio.samples import STANDARD_GRAVITY
 
 
+LONGEST_GAP_NS = 1_000_000_000
+"""A longer gap in the take is played as so long: whoever listens gives a silent line up."""
+
+
 class ReplaySource:
     """Yields a device's description, then the recorded chunks."""
 
@@ -43,8 +47,12 @@ class ReplaySource:
             return b""
         time.sleep(max(0.0, wait_s))
         self._next = self._following()
-        if self._shift_ns is None and self._next is not None:
+        if self._next is None:
+            return chunk
+        if self._shift_ns is None:
             self._shift_ns = _now() - self._next[0]
+        else:
+            self._shift_ns -= max(0, self._next[0] - due_ns - LONGEST_GAP_NS)
         return chunk
 
     def write(self, data: bytes) -> None:

@@ -316,6 +316,20 @@ def test_a_take_that_is_not_there_or_none_cannot_be_replayed(tmp_path):
     assert isinstance(refusal(f"replay:{thesis}"), TakeError)
 
 
+def test_a_replay_does_not_wait_out_a_long_gap(take, tmp_path):
+    """Or whoever listens would take it for lost, begin anew, and never get past the gap."""
+    gapped, whole = tmp_path / "gapped.mcap", open_take(take)
+    writer = TakeWriter(gapped, whole.header)
+    chunks = list(whole.chunks())
+    for k, (arrival_ns, chunk) in enumerate(chunks):
+        writer.write(arrival_ns + (k >= len(chunks) // 2) * 3_600_000_000_000, chunk)
+    writer.close()
+    source = open_source(f"replay:{gapped}")
+    heard, _ = to_its_end(source)
+    assert heard.endswith(b"".join(chunk for _, chunk in chunks))
+    source.close()
+
+
 def test_an_import_cannot_be_replayed(tmp_path, take):
     recorded = open_take(take).header.setup
     setup = Setup(recorded.layout, 100.0)
