@@ -17,7 +17,6 @@ from handstudio.protocol.packets import TIP_SENSOR, Description, ImuPacket
 from handstudio.recording.take import Take, open_take
 from handstudio.samples import STANDARD_GRAVITY
 
-
 LONGEST_GAP_NS = 1_000_000_000
 """A longer gap in the take is played as so long: whoever listens gives a silent line up."""
 
