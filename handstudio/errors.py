@@ -2,19 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 
 class HandstudioError(Exception):
     """An expected failure that a person can act on.
 
+    The words are templates, and what varies in them is given by name, so that a catalogue can hold
+    them: ``TakeError("{path}: is no take.", "Choose another file.", path=path)``.
+
     Args:
-        what: The place and the fact, with figures and limits ("samples.csv, row 7: ...").
+        what: The place and the fact, with figures and limits ("{path}, row {row}: ...").
         remedy: What to do next, as an instruction.
+        values: What stands for the names in the two; without any they are taken literally.
     """
 
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(f"{what}\n{remedy}")
-        self.what = what
-        self.remedy = remedy
+    def __init__(self, what: str, remedy: str, **values: object) -> None:
+        self._templates = what, remedy
+        self._values = values
+        super().__init__("\n".join(self.in_words(_as_written)))
+
+    @property
+    def what(self) -> str:
+        """What happened, in English."""
+        return self.in_words(_as_written)[0]
+
+    @property
+    def remedy(self) -> str:
+        """What to do next, in English."""
+        return self.in_words(_as_written)[1]
+
+    def in_words(self, translate: Callable[[str], str]) -> tuple[str, str]:
+        """What happened and what to do next, in the language of a catalogue."""
+        what, remedy = (translate(template) for template in self._templates)
+        if not self._values:
+            return what, remedy
+        return what.format(**self._values), remedy.format(**self._values)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Errors travel between processes, which an exception's own way does not allow here."""
+        values = {name: str(value) for name, value in self._values.items()}
+        return _again, (type(self), *self._templates, values)
+
+
+def _as_written(template: str) -> str:
+    return template
+
+
+def _again(
+    kind: type[HandstudioError], what: str, remedy: str, values: dict[str, str]
+) -> HandstudioError:
+    return kind(what, remedy, **values)
 
 
 class DeviceError(HandstudioError):

@@ -30,7 +30,8 @@ from handstudio.recording.samples_message import encode_samples
 from handstudio.samples import ImuSamples
 
 FLUSH_S = 0.25
-"""How often a recording is handed to the operating system: the most a crash can cost."""
+"""How often a recording is handed to the operating system, by the clock and by the times of what is
+written: the most a crash can cost."""
 
 UNFINISHED = ".recording"
 """Suffix of a take that is being written, or was when the computer went down."""
@@ -57,6 +58,7 @@ class TakeWriter:
         self.chunks = 0
         self._unfinished = path.with_name(path.name + UNFINISHED)
         self._flushed_at = time.monotonic()
+        self._flushed_until_ns = header.start_utc_ns
         self._stream = self._create()
         try:
             self._begin(header, first_state)
@@ -74,8 +76,10 @@ class TakeWriter:
             self._writer.add_message(self._channel, arrival_ns, chunk, arrival_ns, self.chunks)
             self.bytes += len(chunk)
             self.chunks += 1
-            if time.monotonic() - self._flushed_at >= FLUSH_S:
+            late = time.monotonic() - self._flushed_at >= FLUSH_S
+            if late or arrival_ns - self._flushed_until_ns >= FLUSH_S * 1e9:
                 self.flush()
+                self._flushed_until_ns = arrival_ns
 
     def write_samples(self, samples: ImuSamples, start_utc_ns: int) -> None:
         """Append imported samples."""

@@ -12,9 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from handstudio.layout import glove
+from handstudio.recording.header import Header
 from handstudio.recording.recovery import recover
 from handstudio.recording.take import open_take
-from handstudio.recording.writer import UNFINISHED
+from handstudio.recording.writer import UNFINISHED, TakeWriter
+from handstudio.setup import Setup
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
 
@@ -180,3 +183,16 @@ def test_a_disk_that_is_full_from_the_start_leaves_no_file_in_the_way(tmp_path):
     )
     assert process.stdout.startswith(b"TakeError"), process.stderr.decode()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_written_faster_than_it_happened_is_handed_over_as_often(tmp_path):
+    """Half of a simulated or copied take is half a take too, however fast the machine."""
+    path = tmp_path / "fast.mcap"
+    setup = Setup(glove("right", ["SN1"]), 100.0, decoder="handstudio-1")
+    writer = TakeWriter(path, Header("fast", "S", 1_000, setup, "wire", "test"))
+    for instant in range(1000):
+        writer.write(1_000 + instant * 10_000_000, bytes(CHUNK))
+    whole = writer.close()
+    cut = tmp_path / "cut.mcap.recording"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    assert 3.0 < recover(cut).duration_s < 7.0
