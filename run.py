@@ -134,7 +134,8 @@ def set_up(kind: str) -> None:
 
 def digest(lock: str) -> str:
     """Identify what an installation is made from."""
-    parts = (ROOT / lock, ROOT / "pyproject.toml")
+    catalogues = sorted(ROOT.glob("app/locale/*/LC_MESSAGES/*.po"))  # they are compiled then
+    parts = (ROOT / lock, ROOT / "pyproject.toml", *catalogues)
     for part in parts:
         if not part.is_file():
             raise SetupError(f"{part} is missing. Is this a whole checkout? `git status` tells.")

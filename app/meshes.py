@@ -34,5 +34,5 @@ def mesh(name: str, mirrored: bool = False) -> tuple[Float[Array, "v 3"], Int[Ar
                 return vertices * [-1.0, 1.0, 1.0], faces[:, ::-1]
             return vertices, faces
     raise HandstudioError(
-        f"The mesh {name} is missing from this installation.", "Install handstudio anew."
+        "The mesh {name} is missing from this installation.", "Install handstudio anew.", name=name
     )

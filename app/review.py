@@ -70,8 +70,9 @@ def opened(take: Take, motion: Motion) -> Review:
     """
     if len(motion) == 0:
         raise TakeError(
-            f"{take.path.name} holds no instant of motion.",
+            "{name} holds no instant of motion.",
             "The device sent nothing while it was recorded; record it again.",
+            name=take.path.name,
         )
     time_s = np.asarray((motion.time_us - motion.time_us[0]) * 1e-6)
     shown = np.unique(np.linspace(0, len(time_s) - 1, _PLOTTED).round().astype(int))

@@ -88,5 +88,8 @@ def free_port(wanted: int) -> int:
                 continue
             return port
     raise HandstudioError(
-        f"No free port between {wanted} and {wanted + 99}.", "Name another one: --port."
+        "No free port between {first} and {last}.",
+        "Name another one: --port.",
+        first=wanted,
+        last=wanted + 99,
     )

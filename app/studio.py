@@ -325,8 +325,14 @@ class Studio:
             except HandstudioError as error:
                 self._say(error)
             except Exception as error:  # the job's process may have been killed
-                remedy = _("Try again; if it fails again, restart the studio.")
-                self._say(HandstudioError(f"{done.words}: {error!r}", remedy))
+                self._say(
+                    HandstudioError(
+                        "{work}: {reason}",
+                        "Try again; if it fails again, restart the studio.",
+                        work=done.words,
+                        reason=repr(error),
+                    )
+                )
         work = Work(self._pending[0].words, self.jobs.share_done) if self._pending else None
         self.state = replace(self.state, work=work)
 

@@ -104,7 +104,9 @@ def record(
         json: Print JSON for a program instead of words.
     """
     if seconds is not None and not seconds > 0.0:
-        raise TakeError(f"A take of {seconds:g} s holds nothing.", "Choose more than 0 seconds.")
+        raise TakeError(
+            "A take of {seconds:g} s holds nothing.", "Choose more than 0 seconds.", seconds=seconds
+        )
     hand = _hand(hand_length_mm)
     path = library.new_take_path(
         library.sessions_folder(sessions), subject, name, datetime.now().astimezone()
@@ -307,9 +309,12 @@ def _hand(length_mm: float) -> HandModel:
     shortest, longest = HAND_MM
     if not shortest <= length_mm <= longest:
         raise SetupError(
-            f"A hand is not {length_mm:g} mm long.",
+            "A hand is not {length:g} mm long.",
             "Give it in millimetres, from the wrist crease to the tip of the middle finger: "
-            f"{shortest:g} to {longest:g}.",
+            "{shortest:g} to {longest:g}.",
+            length=length_mm,
+            shortest=shortest,
+            longest=longest,
         )
     return HandModel(hand_length_m=length_mm * 1e-3)
 
@@ -340,7 +345,9 @@ def _await_stream(capture: Capture) -> None:
             raise problem
         if time.monotonic() > end:
             raise DeviceError(
-                f"No data came within {CONNECT_S:.0f} s.", "Check the device: handstudio devices."
+                "No data came within {seconds:.0f} s.",
+                "Check the device: handstudio devices.",
+                seconds=CONNECT_S,
             )
         time.sleep(0.02)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 
 class HandstudioError(Exception):
@@ -11,15 +12,19 @@ class HandstudioError(Exception):
     The words are templates, and what varies in them is given by name, so that a catalogue can hold
     them: ``TakeError("{path}: is no take.", "Choose another file.", path=path)``.
 
+    A value may be another error, the reason of this one: its name stands for what happened, in the
+    language of the rest, and ``{name.remedy}`` for what it says to do.
+
     Args:
         what: The place and the fact, with figures and limits ("{path}, row {row}: ...").
         remedy: What to do next, as an instruction.
         values: What stands for the names in the two; without any they are taken literally.
+            Numbers, text and errors are kept as they are, of anything else its text.
     """
 
-    def __init__(self, what: str, remedy: str, **values: object) -> None:
+    def __init__(self, what: str, remedy: str, /, **values: object) -> None:
         self._templates = what, remedy
-        self._values = values
+        self._values = {name: _kept(value) for name, value in values.items()}
         super().__init__("\n".join(self.in_words(_as_written)))
 
     @property
@@ -37,12 +42,37 @@ class HandstudioError(Exception):
         what, remedy = (translate(template) for template in self._templates)
         if not self._values:
             return what, remedy
-        return what.format(**self._values), remedy.format(**self._values)
+        said = {name: _said(value, translate) for name, value in self._values.items()}
+        return what.format(**said), remedy.format(**said)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Errors travel between processes, which an exception's own way does not allow here."""
-        values = {name: str(value) for name, value in self._values.items()}
-        return _again, (type(self), *self._templates, values)
+        return _again, (type(self), *self._templates, self._values)
+
+
+_Value = int | float | str | HandstudioError
+
+
+class _Said(NamedTuple):
+    """An error as a value of another."""
+
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return self.what
+
+    def __format__(self, spec: str) -> str:
+        return format(self.what, spec)
+
+
+def _kept(value: object) -> _Value:
+    """What is whole in another process too."""
+    return value if isinstance(value, _Value) else str(value)
+
+
+def _said(value: _Value, translate: Callable[[str], str]) -> object:
+    return _Said(*value.in_words(translate)) if isinstance(value, HandstudioError) else value
 
 
 def _as_written(template: str) -> str:
@@ -50,7 +80,7 @@ def _as_written(template: str) -> str:
 
 
 def _again(
-    kind: type[HandstudioError], what: str, remedy: str, values: dict[str, str]
+    kind: type[HandstudioError], what: str, remedy: str, values: dict[str, _Value]
 ) -> HandstudioError:
     return kind(what, remedy, **values)
 

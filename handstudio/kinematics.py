@@ -34,7 +34,8 @@ def skeleton_of(setup: Setup) -> Skeleton:
     if not setup.layout.is_hand:
         raise LayoutError(
             "There is no hand in this recording.",
-            setup.layout.missing_for_hand + " Export orientations instead.",
+            "{why} {why.remedy}",
+            why=setup.layout.no_hand,
         )
     side: HandSide = "left" if setup.layout.side == "left" else "right"
     return nominal_skeleton(side, setup.hand.hand_length_m)

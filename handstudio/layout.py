@@ -6,7 +6,7 @@ a hinge are others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -14,6 +14,7 @@ from handstudio.errors import LayoutError
 from handstudio.hand.skeleton import JOINTS, SEGMENTS
 
 _REMEDY = "Correct the layout and try again; docs/import.md shows a complete one."
+_INSTEAD = "Export orientations instead."
 _SIDES = ("left", "right", "unknown")
 
 
@@ -73,16 +74,15 @@ class Layout(msgspec.Struct, frozen=True):
         )
 
     @property
+    def no_hand(self) -> LayoutError | None:
+        """Why there is no hand to show; None where there is one."""
+        return None if self.is_hand else _no_hand(self)
+
+    @property
     def missing_for_hand(self) -> str:
-        """Why there is no hand to show, as a sentence; empty where there is one."""
-        if self.is_hand:
-            return ""
-        if self.side not in ("left", "right"):
-            return "The layout does not say which hand: no hand is shown."
-        lacking = [name for name in ("forearm", "hand") if name not in self.drivers]
-        if lacking:
-            return f"No sensor on {' and '.join(lacking)}: no hand is shown."
-        return "The layout names segments or joints that are not a hand's: no hand is shown."
+        """Why there is no hand to show, as an English sentence; empty where there is one."""
+        why = self.no_hand
+        return "" if why is None else why.what
 
 
 def check(layout: Layout) -> None:
@@ -91,29 +91,65 @@ def check(layout: Layout) -> None:
         raise LayoutError("The layout has no sensors.", _REMEDY)
     if layout.side not in _SIDES:
         raise LayoutError(
-            f"The side of the layout is {layout.side!r}.", 'Write "left", "right" or "unknown".'
+            "The side of the layout is {side!r}.",
+            'Write "left", "right" or "unknown".',
+            side=layout.side,
         )
-    _refuse_repeats("Sensor", layout.names)
-    _refuse_repeats("Joint", [joint.name for joint in layout.joints])
-    _refuse_repeats("Sensor or joint", [*layout.names, *(joint.name for joint in layout.joints)])
-    _refuse_repeats("Child segment", [joint.child for joint in layout.joints])
+    _refuse_repeats(layout)
     joined = {s for joint in layout.joints for s in (joint.parent, joint.child)}
     for place in layout.sensors:
         if layout.joints and place.segment not in joined:
             raise LayoutError(
-                f"{place.sensor} sits on {place.segment}, which no joint joins to the rest.",
+                "{sensor} sits on {segment}, which no joint joins to the rest.",
                 _REMEDY,
+                sensor=place.sensor,
+                segment=place.segment,
             )
     for joint in layout.joints:
         if joint.axes not in (1, 2, 3):
-            raise LayoutError(f"Joint {joint.name} has {joint.axes} axes, not 1, 2 or 3.", _REMEDY)
+            raise LayoutError(
+                "Joint {joint} has {axes} axes, not 1, 2 or 3.",
+                _REMEDY,
+                joint=joint.name,
+                axes=joint.axes,
+            )
     _refuse_loops(layout)
 
 
-def _refuse_repeats(what: str, names: Sequence[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise LayoutError(f"{what} {name} appears {names.count(name)} times.", _REMEDY)
+def _refuse_repeats(layout: Layout) -> None:
+    sensors = layout.names
+    joints = tuple(joint.name for joint in layout.joints)
+    for name, times in _repeated(sensors):
+        raise LayoutError("Sensor {name} appears {times} times.", _REMEDY, name=name, times=times)
+    for name, times in _repeated(joints):
+        raise LayoutError("Joint {name} appears {times} times.", _REMEDY, name=name, times=times)
+    for name, times in _repeated(sensors + joints):
+        raise LayoutError(
+            "Sensor or joint {name} appears {times} times.", _REMEDY, name=name, times=times
+        )
+    for name, times in _repeated(tuple(joint.child for joint in layout.joints)):
+        raise LayoutError(
+            "Child segment {name} appears {times} times.", _REMEDY, name=name, times=times
+        )
+
+
+def _repeated(names: tuple[str, ...]) -> Iterator[tuple[str, int]]:
+    return ((name, names.count(name)) for name in names if names.count(name) > 1)
+
+
+def _no_hand(layout: Layout) -> LayoutError:
+    if layout.side not in ("left", "right"):
+        return LayoutError("The layout does not say which hand: no hand is shown.", _INSTEAD)
+    match [name for name in ("forearm", "hand") if name not in layout.drivers]:
+        case ["forearm"]:
+            return LayoutError("No sensor on forearm: no hand is shown.", _INSTEAD)
+        case ["hand"]:
+            return LayoutError("No sensor on hand: no hand is shown.", _INSTEAD)
+        case [_, _]:
+            return LayoutError("No sensor on forearm and hand: no hand is shown.", _INSTEAD)
+    return LayoutError(
+        "The layout names segments or joints that are not a hand's: no hand is shown.", _INSTEAD
+    )
 
 
 def _refuse_loops(layout: Layout) -> None:
@@ -123,7 +159,9 @@ def _refuse_loops(layout: Layout) -> None:
         while segment in parent_of:
             segment, steps = parent_of[segment], steps + 1
             if steps > len(parent_of):
-                raise LayoutError(f"The joints around {start} form a loop, not a tree.", _REMEDY)
+                raise LayoutError(
+                    "The joints around {segment} form a loop, not a tree.", _REMEDY, segment=start
+                )
 
 
 _GLOVE = {
@@ -159,7 +197,7 @@ def glove(side: str = "right", sensors: Sequence[str] | None = None) -> Layout:
     names = [f"SN{n}" for n in range(1, 21)] if sensors is None else list(sensors)
     unknown = [name for name in names if name not in _GLOVE]
     if unknown:
-        raise LayoutError(f"The glove has no sensor {', '.join(unknown)}.", _REMEDY)
+        raise LayoutError("The glove has no sensor {sensors}.", _REMEDY, sensors=", ".join(unknown))
     joints = tuple(
         JointPlace(joint.name, joint.parent, joint.child, joint.axes)
         for joint in JOINTS

@@ -327,8 +327,9 @@ def unpack(setup: Setup, packed: bytes) -> State:
         got = msgspec.msgpack.decode(packed, type=_Packed)
     except msgspec.MsgspecError as error:
         raise SetupError(
-            f"The pipeline state stored with this recording cannot be read: {error}.",
+            "The pipeline state stored with this recording cannot be read: {reason}.",
             "Process the take from its start instead: handstudio process --from-start.",
+            reason=error,
         ) from error
     return State(
         setup.filter.unpack(got.filter),

@@ -69,8 +69,9 @@ def process(
         motion = _opened(folder)
     if motion is None:
         raise TakeError(
-            f"{folder}: the motion does not stay as it was written.",
+            "{folder}: the motion does not stay as it was written.",
             "Check the disk, then process the take again.",
+            folder=folder,
         )
     return motion
 
@@ -90,9 +91,10 @@ def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:
 def _refuse_other_sensors(take: Take, setup: Setup) -> None:
     if len(setup.layout.sensors) != len(take.header.setup.layout.sensors):
         raise SetupError(
-            f"The setup has {len(setup.layout.sensors)} sensors, the take "
-            f"{len(take.header.setup.layout.sensors)}.",
+            "The setup has {given} sensors, the take {recorded}.",
             "Choose a setup with the sensors of the take.",
+            given=len(setup.layout.sensors),
+            recorded=len(take.header.setup.layout.sensors),
         )
 
 
@@ -147,8 +149,10 @@ def _compute(take: Take, setup: Setup, from_start: bool, folder: Path, progress:
             writer.discard()
     except OSError as error:
         raise TakeError(
-            f"{folder}: the motion cannot be kept ({error.strerror or error}).",
+            "{folder}: the motion cannot be kept ({reason}).",
             "Free some space or check the folder's permissions, then process the take again.",
+            folder=folder,
+            reason=error.strerror or error,
         ) from error
 
 

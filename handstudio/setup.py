@@ -105,7 +105,12 @@ def filter_named(name: str) -> AnyFilter:
         SetupError: there is none of this name.
     """
     if name not in FILTERS:
-        raise SetupError(f"There is no filter {name!r}.", f"Choose one of: {', '.join(FILTERS)}.")
+        raise SetupError(
+            "There is no filter {name!r}.",
+            "Choose one of: {known}.",
+            name=name,
+            known=", ".join(FILTERS),
+        )
     return FILTERS[name]
 
 

@@ -66,8 +66,9 @@ class EventStream:
             stream._decoder = type(stream._decoder).restore(got.decoder)
         except msgspec.MsgspecError as error:
             raise SetupError(
-                f"The decoder state stored with this recording cannot be read: {error}.",
+                "The decoder state stored with this recording cannot be read: {reason}.",
                 "Process the take from its start instead: handstudio process --from-start.",
+                reason=error,
             ) from error
         stream._last_instant_ns = got.last_instant_ns
         stream._restarted = got.restarted

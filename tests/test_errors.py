@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
-from handstudio.errors import HandstudioError, TakeError
+from handstudio.errors import HandstudioError, LayoutError, TakeError
 
 
 def test_values_stand_in_the_words_of_any_language() -> None:
@@ -25,8 +25,25 @@ def test_values_may_hold_braces() -> None:
 
 
 def test_an_error_comes_whole_out_of_another_process() -> None:
-    error = TakeError("{path}: is no take.", "Choose another.", path=Path("x.mcap"))
+    why = LayoutError("{sensor} is loose.", "Tape {sensor} on.", sensor="SN4")
+    error = TakeError(
+        "{path}, {seconds:.1f} s, {row:04d}: {why}",
+        "{why.remedy}",
+        path=Path("x.mcap"),
+        seconds=1.25,
+        row=7,
+        why=why,
+    )
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is TakeError
-    assert (again.what, again.remedy) == (error.what, error.remedy)
+    assert (again.what, again.remedy) == ("x.mcap, 1.2 s, 0007: SN4 is loose.", "Tape SN4 on.")
     assert str(again) == str(error)
+    catalogue = {"{sensor} is loose.": "{sensor} flojo", "{why.remedy}": "! {why.remedy}"}
+    assert again.in_words(lambda text: catalogue.get(text, text)) == (
+        "x.mcap, 1.2 s, 0007: SN4 flojo",
+        "! Tape SN4 on.",
+    )
+
+
+def test_a_value_may_be_called_anything() -> None:
+    assert TakeError("{what} {remedy} {self}", "-", what=1, remedy=2, self=3).what == "1 2 3"

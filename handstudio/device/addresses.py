@@ -39,7 +39,8 @@ def open_source(address: str) -> ByteSource:
             return ReplaySource(Path(place))
         case _:
             raise DeviceError(
-                f"{address!r} is not the address of a device.",
+                "{address!r} is not the address of a device.",
                 "Write serial:PORT, tcp:HOST:PORT, virtual: (or virtual:?rate=1000) or "
                 "replay:FILE.",
+                address=address,
             )

@@ -62,6 +62,11 @@ INTRODUCTION_S = 4.0  # a device that has not described itself by then is not on
 HEALTH_S = 0.1  # between two times the figures are renewed: they cost as much as a filter step
 HISTORY = 2000  # motions kept for `drain`
 
+_NO_GLOVE = (
+    "Choose another port, switch the glove on, or choose the decoder it needs "
+    "(handstudio/protocol/MAKERS.md)."
+)
+
 
 @dataclass
 class _Wanted:
@@ -123,8 +128,10 @@ class Capture:
         except Exception as error:  # a thread must not die unseen
             self._give_up(
                 HandstudioError(
-                    f"The capture stopped: {type(error).__name__}: {error}.",
+                    "The capture stopped: {kind}: {reason}.",
                     "Restart the studio and report this; the take was closed.",
+                    kind=type(error).__name__,
+                    reason=error,
                 )
             )
             raise
@@ -187,7 +194,9 @@ class Capture:
             self._ask(order.command, order.argument)
         except ValueError as error:
             self._reports.append(
-                DeviceError(f"No such command can be sent: {error}.", "Correct the command.")
+                DeviceError(
+                    "No such command can be sent: {reason}.", "Correct the command.", reason=error
+                )
             )
 
     def _work(self) -> None:
@@ -244,10 +253,10 @@ class Capture:
 
     def _say_that_it_rests(self, still_s: float) -> None:
         if still_s > INTRODUCTION_S and self.newest.problem is None:
-            glove = _serial_number(self.newest.setup)
             problem = DeviceError(
-                f"{glove} is there but sends no motion; it is asked to twice a second.",
+                "{glove} is there but sends no motion; it is asked to twice a second.",
                 "Switch the glove off and on.",
+                glove=_serial_number(self.newest.setup),
             )
             self.newest = replace(self.newest, problem=problem)
 
@@ -258,15 +267,7 @@ class Capture:
         return SILENCE_S if setup is None else max(SILENCE_S, 3.0 / setup.rate_hz)
 
     def _refuse(self, line: Line) -> None:
-        heard = "nothing came" if line.received == 0 else f"{line.received} bytes came"
-        self._give_up(
-            DeviceError(
-                f"{self.newest.address} did not say that it is a glove: {heard} within "
-                f"{INTRODUCTION_S:.0f} s.",
-                "Choose another port, switch the glove on, or choose the decoder it needs "
-                "(handstudio/protocol/MAKERS.md).",
-            )
-        )
+        self._give_up(_no_glove(self.newest.address, line.received))
 
     def _find_out(self, chunk: bytes, arrival_ns: int, line: Line) -> None:
         """Nothing enters a take or the pipeline before it is known from whom it is."""
@@ -321,9 +322,11 @@ class Capture:
             case ForeignVersion(version=version):
                 self._give_up(
                     DeviceError(
-                        f"{self.newest.address} speaks version {version} of the protocol; this "
-                        "studio speaks version 1.",
+                        "{address} speaks version {version} of the protocol; this studio speaks "
+                        "version 1.",
                         "Update handstudio, or the device's firmware.",
+                        address=self.newest.address,
+                        version=version,
                     )
                 )
             case Reply():
@@ -358,12 +361,7 @@ class Capture:
 
     def _put_off(self, other: Setup) -> None:
         """Another device, or other settings, in the middle of a take: not into the same file."""
-        mine, theirs = _serial_number(self.newest.setup), _serial_number(other)
-        if mine != theirs:
-            what, remedy = f"Another device answers ({theirs}, not {mine})", f"Plug {mine} back in"
-        else:
-            what, remedy = f"{mine} came back with other settings", "Set it as it was"
-        problem = DeviceError(f"{what}: the take waits.", f"{remedy}, or stop the take.")
+        problem = _take_waits(_serial_number(self.newest.setup), _serial_number(other))
         self._lose()
         self.newest = replace(self.newest, problem=problem)
 
@@ -377,8 +375,9 @@ class Capture:
         else:
             self._give_up(
                 DeviceError(
-                    f"{self.newest.address} closed the line before it said who it is.",
+                    "{address} closed the line before it said who it is.",
                     "Check that it is a glove and that nothing else uses it.",
+                    address=self.newest.address,
                 )
             )
 
@@ -482,8 +481,40 @@ class Capture:
             self._reports.append(done.failure or TakeDone(done.path))
 
 
+def _no_glove(address: str, received: int) -> DeviceError:
+    if received == 0:
+        return DeviceError(
+            "{address} did not say that it is a glove: nothing came within {seconds:.0f} s.",
+            _NO_GLOVE,
+            address=address,
+            seconds=INTRODUCTION_S,
+        )
+    return DeviceError(
+        "{address} did not say that it is a glove: {received} bytes came within {seconds:.0f} s.",
+        _NO_GLOVE,
+        address=address,
+        received=received,
+        seconds=INTRODUCTION_S,
+    )
+
+
+def _take_waits(mine: str, other: str) -> DeviceError:
+    if mine == other:
+        return DeviceError(
+            "{mine} came back with other settings: the take waits.",
+            "Set it as it was, or stop the take.",
+            mine=mine,
+        )
+    return DeviceError(
+        "Another device answers ({other}, not {mine}): the take waits.",
+        "Plug {mine} back in, or stop the take.",
+        mine=mine,
+        other=other,
+    )
+
+
 def _serial_number(setup: Setup | None) -> str:
-    return setup.device.serial_number if setup and setup.device else "the one before"
+    return setup.device.serial_number if setup and setup.device else "?"
 
 
 def _emptied(values: deque[T]) -> list[T]:

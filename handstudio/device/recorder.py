@@ -75,8 +75,10 @@ class Recorder:
         waiting = self.bytes - self._written
         if waiting + len(chunk) > BACKLOG_LIMIT:
             self.failure = TakeError(
-                f"{self.path}: the disk is {waiting / 1e6:.0f} MB behind.",
+                "{path}: the disk is {megabytes:.0f} MB behind.",
                 "Record to a faster disk. The take is kept up to here.",
+                path=self.path,
+                megabytes=waiting / 1e6,
             )
             return
         self.bytes += len(chunk)
@@ -110,8 +112,11 @@ class Recorder:
             self._writer.abandon()
         except Exception as error:  # a thread must not die unseen
             self.failure = HandstudioError(
-                f"{self.path}: writing stopped ({type(error).__name__}: {error}).",
-                f"What was written until now is kept: handstudio recover '{self.path}.recording'.",
+                "{path}: writing stopped ({kind}: {reason}).",
+                "What was written until now is kept: handstudio recover '{path}.recording'.",
+                path=self.path,
+                kind=type(error).__name__,
+                reason=error,
             )
             self._writer.abandon()
         finally:

@@ -28,8 +28,9 @@ class ReplaySource:
         take = open_take(path)
         if take.header.kind != "wire" or take.header.setup.decoder != "handstudio-1":
             raise DeviceError(
-                f"{path}: holds no bytes of a device that can be played back.",
+                "{path}: holds no bytes of a device that can be played back.",
                 "Open it in Review instead.",
+                path=path,
             )
         self._chunks: Iterator[tuple[int, bytes]] = take.chunks()
         self._next: tuple[int, bytes] | None = (0, encode(_description(take)))
@@ -76,7 +77,9 @@ def _description(take: Take) -> Description:
     setup = take.header.setup
     device, ranges = setup.device, setup.ranges
     if device is None or ranges is None:
-        raise DeviceError(f"{take.path}: does not say which device it is from.", "Choose another.")
+        raise DeviceError(
+            "{path}: does not say which device it is from.", "Choose another.", path=take.path
+        )
     numbers = [TIP_SENSOR if n == "Tip" else int(n.removeprefix("SN")) for n in setup.layout.names]
     side = setup.layout.side
     return Description(

@@ -67,14 +67,24 @@ def _cannot_open(port: str, error: Exception) -> DeviceError:
     text = str(error)
     if "ermission" in text or "Access is denied" in text:
         return DeviceError(
-            f"{port}: you may not open this port.",
+            "{port}: you may not open this port.",
             "Linux: add yourself to the port's group, sudo usermod -aG dialout $USER, and log in "
             "again. Windows: close the program that has the port open.",
+            port=port,
         )
     if "busy" in text or "lock" in text or "temporarily unavailable" in text:
         return DeviceError(
-            f"{port}: another program has this port open.", "Close that program, then connect."
+            "{port}: another program has this port open.",
+            "Close that program, then connect.",
+            port=port,
         )
     if "No such file" in text or "No such device" in text or "FileNotFound" in text:
-        return DeviceError(f"{port}: there is no such port.", "Plug the device in, or look for it.")
-    return DeviceError(f"{port}: cannot be opened ({text}).", "Unplug the device and plug it in.")
+        return DeviceError(
+            "{port}: there is no such port.", "Plug the device in, or look for it.", port=port
+        )
+    return DeviceError(
+        "{port}: cannot be opened ({reason}).",
+        "Unplug the device and plug it in.",
+        port=port,
+        reason=text,
+    )

@@ -20,8 +20,10 @@ class TcpSource:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (OSError, ValueError, OverflowError) as error:
             raise DeviceError(
-                f"tcp:{place} does not answer ({error}).",
+                "tcp:{place} does not answer ({reason}).",
                 "Check host and port, and that the device is switched on.",
+                place=place,
+                reason=error,
             ) from error
 
     def read(self, timeout_s: float) -> bytes:

@@ -70,8 +70,10 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
     unknown = options.keys() - {*_OPTIONS, "transport"}
     if unknown:
         raise DeviceError(
-            f"A virtual glove has no option {', '.join(sorted(unknown))}.",
-            f"It has {', '.join(_OPTIONS)} and transport.",
+            "A virtual glove has no option {unknown}.",
+            "It has {options} and transport.",
+            unknown=", ".join(sorted(unknown)),
+            options=", ".join(_OPTIONS),
         )
     tcp = options.get("transport") == "tcp" or sys.platform == "win32"
     command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--quit-with-parent"]
@@ -91,8 +93,10 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
         )
     except OSError as error:
         raise DeviceError(
-            f"The virtual glove cannot be started: {command[0]} ({error.strerror or error}).",
+            "The virtual glove cannot be started: {program} ({reason}).",
             "Install handstudio anew: its Python has gone.",
+            program=command[0],
+            reason=error.strerror or error,
         ) from error
 
 
@@ -113,7 +117,8 @@ def _address(process: subprocess.Popen[str]) -> str:
         address = json.loads(line)["address"]
     except (ValueError, KeyError, TypeError) as error:
         raise DeviceError(
-            f"The virtual glove did not start (it said {line.strip()!r}).",
+            "The virtual glove did not start (it said {line!r}).",
             "Try again; its messages are in the terminal the studio runs in.",
+            line=line.strip(),
         ) from error
     return str(address)

@@ -63,8 +63,10 @@ def export_csv(
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
         raise TakeError(
-            f"{target}: cannot be written ({error.strerror or error}).",
+            "{path}: cannot be written ({reason}).",
             "Choose another folder, or close the program that has the file open.",
+            path=target,
+            reason=error.strerror or error,
         ) from error
     return target
 
@@ -85,8 +87,11 @@ def cut(motion: Motion, window: Window) -> Motion:
     last = int(np.searchsorted(time_us, round(end_s * 1e6), side="right"))
     if first >= last:
         raise TakeError(
-            f"Nothing lies between {window.start_s:.2f} s and {end_s:.2f} s.",
-            f"Choose a window within 0 and {whole_s:.2f} s.",
+            "Nothing lies between {start:.2f} s and {end:.2f} s.",
+            "Choose a window within 0 and {whole:.2f} s.",
+            start=window.start_s,
+            end=end_s,
+            whole=whole_s,
         )
     return motion[first:last]
 
@@ -119,9 +124,10 @@ def _table(setup: Setup, motion: Motion, content: Content) -> _Table:
             return _orientations(setup)
         case _ if not setup.layout.is_hand:
             raise TakeError(
-                f"This take has no joint angles. {setup.layout.missing_for_hand}",
+                "This take has no joint angles. {why}",
                 "Export orientations instead: they hold every sensor and the rotation across "
                 "each joint.",
+                why=setup.layout.no_hand,
             )
         case "angles":
             return _angles(setup, motion)

@@ -141,8 +141,9 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
             got = msgspec.msgpack.decode(packed, type=_Packed)
         except msgspec.MsgspecError as error:
             raise SetupError(
-                f"The saved filter state is not one of VQF ({error}).",
+                "The saved filter state is not one of VQF ({reason}).",
                 "Process the take again from its start: handstudio process --from-start.",
+                reason=error,
             ) from error
         return VqfState(
             got.period_s,

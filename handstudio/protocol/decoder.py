@@ -98,8 +98,9 @@ class V1Decoder:
             return cls(msgspec.json.decode(saved, type=V1State))
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise TakeError(
-                f"The saved state of the decoder cannot be read: {error}.",
+                "The saved state of the decoder cannot be read: {reason}.",
                 "Process the take again from its beginning.",
+                reason=error,
             ) from error
 
 
@@ -133,16 +134,19 @@ def decoder_named(name: str) -> type[Decoder]:
         return DECODERS[name]
     offered = entry_points(group=ENTRY_POINTS)
     if name not in offered.names:
-        known = ", ".join(sorted({*DECODERS, *offered.names}))
         raise SetupError(
-            f"No decoder is called {name!r}; known are {known}.",
+            "No decoder is called {name!r}; known are {known}.",
             "Choose one of these, or install the package that brings it.",
+            name=name,
+            known=", ".join(sorted({*DECODERS, *offered.names})),
         )
     try:
         found: type[Decoder] = offered[name].load()
     except (ImportError, AttributeError) as error:
         raise SetupError(
-            f"The decoder {name!r} cannot be loaded: {error}.",
+            "The decoder {name!r} cannot be loaded: {reason}.",
             "Install the package that brings it anew.",
+            name=name,
+            reason=error,
         ) from error
     return found

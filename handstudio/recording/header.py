@@ -72,13 +72,18 @@ def decode_header(record: dict[str, str], place: str) -> Header:
         header = msgspec.json.decode(_checked(record), type=Header)
     except (KeyError, msgspec.MsgspecError, LayoutError, _DamagedError) as error:
         raise TakeError(
-            f"{place}: the header of the take cannot be read ({error}).",
+            "{path}: the header of the take cannot be read ({reason}).",
             "Open it with the version of handstudio that recorded it, or update handstudio.",
+            path=place,
+            reason=error,
         ) from error
     if header.format > FORMAT:
         raise TakeError(
-            f"{place}: a take of format {header.format}; this version reads up to {FORMAT}.",
+            "{path}: a take of format {format}; this version reads up to {newest}.",
             "Update handstudio.",
+            path=place,
+            format=header.format,
+            newest=FORMAT,
         )
     return header
 

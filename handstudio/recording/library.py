@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
 import platformdirs
 
@@ -25,8 +26,17 @@ class Entry:
 
     path: Path
     take: Take | None
-    problem: str = ""
-    remedy: str = ""
+    error: HandstudioError | None = None
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be opened, in English; empty where it can."""
+        return "" if self.error is None else self.error.what
+
+    @property
+    def remedy(self) -> str:
+        """What to do about that, in English; empty where there is nothing to do."""
+        return "" if self.error is None else self.error.remedy
 
 
 def sessions_folder(chosen: Path | None = None) -> Path:
@@ -58,26 +68,33 @@ def new_take_path(sessions: Path, subject: str, name: str, now: datetime) -> Pat
         path = folder / f"{candidate}.mcap"
         if not path.exists() and not path.with_name(path.name + UNFINISHED).exists():
             return path
-    raise TakeError(f"{folder}: ten thousand takes are called {stem}.", "Choose another name.")
+    raise TakeError(
+        "{folder}: ten thousand takes are called {name}.",
+        "Choose another name.",
+        folder=folder,
+        name=stem,
+    )
 
 
-def file_name(text: str, what: str) -> str:
+def file_name(text: str, what: Literal["subject", "take"]) -> str:
     """Words as a file name that every system accepts; letters of any language stay.
 
     Raises:
         TakeError: nothing is left.
     """
     clean = _FORBIDDEN.sub("_", text.strip()).strip("._")[:80]
-    if not clean:
-        raise TakeError(f"The {what} has no name.", "Type a name with letters or digits.")
-    return clean
+    if clean:
+        return clean
+    if what == "subject":
+        raise TakeError("The subject has no name.", "Type a name with letters or digits.")
+    raise TakeError("The take has no name.", "Type a name with letters or digits.")
 
 
 def _entry(path: Path) -> Entry:
     try:
         return Entry(path, open_take(path))
     except HandstudioError as error:
-        return Entry(path, None, error.what, error.remedy)
+        return Entry(path, None, error)
 
 
 def _age(path: Path) -> float:

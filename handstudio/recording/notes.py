@@ -49,8 +49,11 @@ def load_notes(take: Path) -> Notes:
     if problem is None:
         return Notes()
     raise TakeError(
-        f"{path}: the notes cannot be read ({problem}).",
-        f"Move it and {backup.name} away to go on without notes; the take itself is not touched.",
+        "{path}: the notes cannot be read ({reason}).",
+        "Move it and {backup} away to go on without notes; the take itself is not touched.",
+        path=path,
+        reason=problem,
+        backup=backup.name,
     )
 
 
@@ -65,6 +68,8 @@ def save_notes(take: Path, notes: Notes) -> None:
         write_atomically(path, msgspec.json.format(msgspec.json.encode(notes)))
     except OSError as error:
         raise TakeError(
-            f"{path}: cannot be written ({error.strerror or error}).",
+            "{path}: cannot be written ({reason}).",
             "Free some space or check the folder's permissions.",
+            path=path,
+            reason=error.strerror or error,
         ) from error

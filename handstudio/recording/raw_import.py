@@ -33,6 +33,10 @@ _SIGNALS = ("gyr", "acc", "mag")
 _AXES = ("x", "y", "z")
 _LATEST_US = 2.0**52  # the year 2112, and half of what floats count exactly
 _GUIDE = "docs/import.md shows what a folder must hold."
+_LAYOUT_GUIDE = (
+    "Add a layout.toml that says where each sensor sits. docs/import.md shows what a folder must "
+    "hold."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +98,14 @@ def read_folder(folder: Path) -> Folder:
         ImportFolderError: something is missing or wrong; names file, row and remedy.
     """
     if not folder.is_dir():
-        raise ImportFolderError(f"{folder}: there is no such folder.", "Check the path.")
+        raise ImportFolderError(
+            "{folder}: there is no such folder.", "Check the path.", folder=folder
+        )
     table = _table(folder, "samples")
     if table is None:
-        raise ImportFolderError(f"{folder}: no samples.csv and no samples.parquet in it.", _GUIDE)
+        raise ImportFolderError(
+            "{folder}: no samples.csv and no samples.parquet in it.", _GUIDE, folder=folder
+        )
     layout = _layout(folder, table)
     time_us = _times(table, "samples")
     signals = {kind: _signal(table, layout, kind) for kind in _SIGNALS}
@@ -131,12 +139,17 @@ def _table(folder: Path, stem: str) -> pa.Table | None:
             table = read(path)
         except (pa.ArrowException, OSError) as error:
             raise ImportFolderError(
-                f"{path}: cannot be read as a table ({error}).",
-                "It needs one header row, commas, and a number in every cell. " + _GUIDE,
+                "{path}: cannot be read as a table ({reason}).",
+                "It needs one header row, commas, and a number in every cell. docs/import.md shows "
+                "what a folder must hold.",
+                path=path,
+                reason=error,
             ) from error
         repeated = [name for name in table.column_names if table.column_names.count(name) > 1]
         if repeated:
-            raise ImportFolderError(f"{path}: more than one column {repeated[0]}.", "Keep one.")
+            raise ImportFolderError(
+                "{path}: more than one column {column}.", "Keep one.", path=path, column=repeated[0]
+            )
         return table
     return None
 
@@ -154,9 +167,13 @@ def _layout(folder: Path, table: pa.Table) -> Layout:
     try:
         return _parse_layout(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:  # not readable, not UTF-8, not TOML, not a layout
-        raise ImportFolderError(f"{path}: not a layout ({error}).", _GUIDE) from error
+        raise ImportFolderError(
+            "{path}: not a layout ({reason}).", _GUIDE, path=path, reason=error
+        ) from error
     except LayoutError as error:
-        raise ImportFolderError(f"{path}: {error.what}", error.remedy) from error
+        raise ImportFolderError(
+            "{path}: {fault}", "{fault.remedy}", path=path, fault=error
+        ) from error
 
 
 def _glove_layout(folder: Path, table: pa.Table) -> Layout:
@@ -164,11 +181,16 @@ def _glove_layout(folder: Path, table: pa.Table) -> Layout:
     named = {name.rpartition("_gyr_")[0] for name in table.column_names if "_gyr_" in name}
     known = [name for name in (*glove().names, sensor_name(TIP_SENSOR)) if name in named]
     unknown = sorted(named - set(known))
-    if unknown or not known:
+    if unknown:
         raise ImportFolderError(
-            f"{folder}: there is no layout.toml, and "
-            + (f"the glove has no sensor {', '.join(unknown)}." if unknown else "no SN1_gyr_x ..."),
-            "Add a layout.toml that says where each sensor sits. " + _GUIDE,
+            "{folder}: there is no layout.toml, and the glove has no sensor {sensors}.",
+            _LAYOUT_GUIDE,
+            folder=folder,
+            sensors=", ".join(unknown),
+        )
+    if not known:
+        raise ImportFolderError(
+            "{folder}: there is no layout.toml, and no SN1_gyr_x ...", _LAYOUT_GUIDE, folder=folder
         )
     return glove("right", known)
 
@@ -190,20 +212,28 @@ def _parse_layout(document: dict[str, Any]) -> Layout:
 def _times(table: pa.Table, file: str) -> Array:
     time_us = np.round(_column(table, "time_s", file) * 1e6)
     if len(time_us) < 2:
-        raise ImportFolderError(f"{file}: {len(time_us)} rows; at least 2 are needed.", _GUIDE)
+        raise ImportFolderError(
+            "{file}: {rows} rows; at least 2 are needed.", _GUIDE, file=file, rows=len(time_us)
+        )
     _refuse_nan(time_us, "time_s", file)
     if np.abs(time_us).max() > _LATEST_US:
         raise ImportFolderError(
-            f"{file}: time_s reaches {np.abs(time_us).max() * 1e-6:.3g}, which are no seconds.",
+            "{file}: time_s reaches {largest:.3g}, which are no seconds.",
             "Write time_s in seconds.",
+            file=file,
+            largest=float(np.abs(time_us).max()) * 1e-6,
         )
     step = np.diff(time_us)
     if (step <= 0).any():
         row = int(np.argmax(step <= 0)) + 1
         before, after = time_us[row - 1] * 1e-6, time_us[row] * 1e-6
         raise ImportFolderError(
-            f"{file}, row {row + 1}: time does not move on: {after:.6f} s after {before:.6f} s.",
+            "{file}, row {row}: time does not move on: {after:.6f} s after {before:.6f} s.",
             "Sort the rows by time_s and remove those that repeat one.",
+            file=file,
+            row=row + 1,
+            after=float(after),
+            before=float(before),
         )
     return time_us.astype(np.int64)
 
@@ -219,8 +249,11 @@ def _signal(table: pa.Table, layout: Layout, kind: str) -> Array:
             continue
         if absent:
             raise ImportFolderError(
-                f"samples: no column {', '.join(absent)}.",
-                f"Add it, or take {sensor} out of layout.toml. " + _GUIDE,
+                "samples: no column {columns}.",
+                "Add it, or take {sensor} out of layout.toml. docs/import.md shows what a folder "
+                "must hold.",
+                columns=", ".join(absent),
+                sensor=sensor,
             )
         values = np.stack([_column(table, name, "samples") for name in names], axis=-1)
         if kind != "mag":  # a compass may be slower than the rest: NaN is no new reading
@@ -238,14 +271,18 @@ def _typical_share(fresh: Array) -> float:
 
 def _column(table: pa.Table, name: str, file: str) -> Array:
     if name not in table.column_names:
-        raise ImportFolderError(f"{file}: no column {name}.", _GUIDE)
+        raise ImportFolderError("{file}: no column {column}.", _GUIDE, file=file, column=name)
     try:
         return np.asarray(table[name].cast(pa.float64()).to_numpy(), dtype=np.float64)
     except pa.ArrowException as error:
         row, cell = _first_text(table[name])
         raise ImportFolderError(
-            f"{file}, row {row}, column {name}: {cell!r} is not a number.",
+            "{file}, row {row}, column {column}: {cell!r} is not a number.",
             "Write plain numbers with a decimal point.",
+            file=file,
+            row=row,
+            column=name,
+            cell=cell,
         ) from error
 
 
@@ -263,10 +300,13 @@ def _refuse_nan(values: Array, name: str, file: str) -> None:
     bad = ~np.isfinite(values)
     if bad.any():
         raise ImportFolderError(
-            f"{file}, row {int(np.argmax(bad)) + 1}, column {name}: not a number "
-            f"({int(bad.sum())} such cells in this column).",
+            "{file}, row {row}, column {column}: not a number ({count} such cells in this column).",
             "Leave out the rows in which a sensor gave nothing: missing instants are a gap, and "
             "gaps are understood.",
+            file=file,
+            row=int(np.argmax(bad)) + 1,
+            column=name,
+            count=int(bad.sum()),
         )
 
 
@@ -283,8 +323,11 @@ def _labels(folder: Path, zero_s: float) -> tuple[Label, ...]:
     for row, (start, end) in enumerate(zip(starts, ends, strict=True), start=1):
         if not start < end:
             raise ImportFolderError(
-                f"labels, row {row}: ends at {end} s, not after its start at {start} s.",
+                "labels, row {row}: ends at {end} s, not after its start at {start} s.",
                 "Correct start_s and end_s.",
+                row=row,
+                end=float(end),
+                start=float(start),
             )
     return tuple(
         Label(float(start) - zero_s, float(end) - zero_s, name)

@@ -65,7 +65,10 @@ def _readable(path: Path) -> Iterator[McapRecord]:
         return  # the end of what can be read is what recovery is for
     except OSError as error:
         raise TakeError(
-            f"{path}: cannot be opened ({error.strerror or error}).", "Check the path."
+            "{path}: cannot be opened ({reason}).",
+            "Check the path.",
+            path=path,
+            reason=error.strerror or error,
         ) from error
 
 
@@ -78,8 +81,9 @@ def _beginning(records: Iterator[McapRecord], path: Path) -> tuple[Header, bytes
         if isinstance(record, Attachment) and record.name == STATE_ATTACHMENT and header:
             return header, sound_state(about, record.data)
     raise TakeError(
-        f"{path}: holds nothing of a take that can be read.",
+        "{path}: holds nothing of a take that can be read.",
         "If it was recorded elsewhere, copy it again: the copy may be cut short.",
+        path=path,
     )
 
 

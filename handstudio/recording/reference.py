@@ -52,6 +52,8 @@ def load_reference(take: Path) -> Reference:
             return Reference(file["time_us"], sensors, file["q_world_sensor"])
     except (OSError, KeyError, ValueError) as error:
         raise TakeError(
-            f"{path}: no reference can be read ({error}).",
+            "{path}: no reference can be read ({reason}).",
             "Import the folder again with a reference.csv in it.",
+            path=path,
+            reason=error,
         ) from error

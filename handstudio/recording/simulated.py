@@ -72,9 +72,16 @@ def truth_path(take: Path) -> Path:
 def _refuse(seconds: float, rate_hz: int) -> None:
     if rate_hz not in RATES_HZ:
         rates = ", ".join(str(rate) for rate in RATES_HZ)
-        raise SetupError(f"No virtual glove has a rate of {rate_hz} Hz.", f"Choose one of {rates}.")
+        raise SetupError(
+            "No virtual glove has a rate of {rate} Hz.",
+            "Choose one of {rates}.",
+            rate=rate_hz,
+            rates=rates,
+        )
     if not seconds > 0.0:
-        raise SetupError(f"A take of {seconds:g} s holds nothing.", "Choose more than 0 s.")
+        raise SetupError(
+            "A take of {seconds:g} s holds nothing.", "Choose more than 0 s.", seconds=seconds
+        )
 
 
 def _write(writer: TakeWriter, glove: Firmware, seconds: float, start_ns: int) -> np.ndarray:

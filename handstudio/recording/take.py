@@ -108,8 +108,9 @@ class Take:
         setup = self.header.setup
         if setup.decoder is None:
             raise TakeError(
-                f"{self.path}: the take does not say which decoder its bytes need.",
+                "{path}: the take does not say which decoder its bytes need.",
                 "It was not written by handstudio; import it instead.",
+                path=self.path,
             )
         if from_start or not self.first_state.stream:
             return EventStream(setup.decoder, setup.ranges)
@@ -124,8 +125,9 @@ def open_take(path: Path) -> Take:
     """
     if path.name.endswith(UNFINISHED):
         raise TakeError(
-            f"{path}: this recording was interrupted.",
-            f"Get back what was saved: handstudio recover '{path}'.",
+            "{path}: this recording was interrupted.",
+            "Get back what was saved: handstudio recover '{path}'.",
+            path=path,
         )
     header, about, state = None, dict[str, str](), FirstState()
     for record in _records(path):
@@ -139,7 +141,9 @@ def open_take(path: Path) -> Take:
             case _:
                 pass
     if header is None:
-        raise TakeError(f"{path}: an MCAP file, but not a take.", "Choose a file handstudio wrote.")
+        raise TakeError(
+            "{path}: an MCAP file, but not a take.", "Choose a file handstudio wrote.", path=path
+        )
     return Take(path, header, state, _summary(path))
 
 
@@ -202,25 +206,32 @@ def _records(path: Path) -> Iterator[McapRecord]:
             for record in records_until_damage(stream):
                 if isinstance(record, McapHeader) and record.profile != PROFILE:
                     raise TakeError(
-                        f"{path}: an MCAP file of profile {record.profile!r}, not a take.",
+                        "{path}: an MCAP file of profile {profile!r}, not a take.",
                         "Choose a file handstudio wrote, or import a folder.",
+                        path=path,
+                        profile=record.profile,
                     )
                 yield record
     except OSError as error:
         raise TakeError(
-            f"{path}: cannot be opened ({error.strerror or error}).", "Check the path."
+            "{path}: cannot be opened ({reason}).",
+            "Check the path.",
+            path=path,
+            reason=error.strerror or error,
         ) from error
     except DAMAGE as error:
         raise _damaged(path, error) from error
 
 
-def _damaged(path: Path, error: Exception | None) -> TakeError:
+def _damaged(path: Path, error: Exception) -> TakeError:
     with path.open("rb") as stream:
         ours = stream.read(8) == b"\x89MCAP0\r\n"
     if not ours:
-        return TakeError(f"{path}: not a take.", "Choose a file that ends in .mcap.")
-    why = f" ({type(error).__name__}: {error})" if error else ""
+        return TakeError("{path}: not a take.", "Choose a file that ends in .mcap.", path=path)
     return TakeError(
-        f"{path}: the file is damaged or cut short{why}.",
-        f"Get back what is readable: handstudio recover '{path}'.",
+        "{path}: the file is damaged or cut short ({kind}: {reason}).",
+        "Get back what is readable: handstudio recover '{path}'.",
+        path=path,
+        kind=type(error).__name__,
+        reason=error,
     )

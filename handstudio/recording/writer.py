@@ -127,9 +127,9 @@ class TakeWriter:
                 return self._unfinished.open("xb")
             except FileExistsError as error:
                 raise TakeError(
-                    f"{self._unfinished} is there already: an interrupted recording.",
-                    f"Recover it first (handstudio recover '{self._unfinished}'), "
-                    "or record under another name.",
+                    "{path} is there already: an interrupted recording.",
+                    "Recover it first (handstudio recover '{path}'), or record under another name.",
+                    path=self._unfinished,
                 ) from error
 
     def _begin(self, header: Header, first_state: bytes) -> None:
@@ -154,12 +154,16 @@ class TakeWriter:
             yield
         except OSError as error:
             raise TakeError(
-                f"{self._unfinished}: cannot be written ({error.strerror or error}).",
+                "{path}: cannot be written ({reason}).",
                 "Free some space or check the folder's permissions. What was recorded until now "
-                f"is kept: handstudio recover '{self._unfinished}'.",
+                "is kept: handstudio recover '{path}'.",
+                path=self._unfinished,
+                reason=error.strerror or error,
             ) from error
 
 
 def _refuse_existing(path: Path) -> None:
     if path.exists():
-        raise TakeError(f"{path} exists already.", "Takes are never overwritten: choose a name.")
+        raise TakeError(
+            "{path} exists already.", "Takes are never overwritten: choose a name.", path=path
+        )

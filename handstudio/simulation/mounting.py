@@ -54,8 +54,11 @@ def segment_indices(layout: Layout) -> list[int]:
     for place in layout.sensors:
         if place.segment not in SEGMENTS:
             raise LayoutError(
-                f"{place.sensor} sits on {place.segment}, which a simulated hand does not have.",
-                f"Put it on one of: {', '.join(SEGMENTS)}.",
+                "{sensor} sits on {segment}, which a simulated hand does not have.",
+                "Put it on one of: {segments}.",
+                sensor=place.sensor,
+                segment=place.segment,
+                segments=", ".join(SEGMENTS),
             )
     return [SEGMENTS.index(place.segment) for place in layout.sensors]
 
