@@ -103,3 +103,7 @@ class LayoutError(HandstudioError):
 
 class SetupError(HandstudioError):
     """A setup asks for something this version does not know."""
+
+
+class SettingsError(HandstudioError):
+    """What the studio remembers cannot be read, makes no sense, or cannot be kept."""

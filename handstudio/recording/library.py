@@ -5,28 +5,59 @@
 
 from __future__ import annotations
 
-import re
+import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import TypeAlias
 
 import platformdirs
 
 from handstudio.errors import HandstudioError, TakeError
+from handstudio.recording.held import is_held
+from handstudio.recording.moves import settle
+from handstudio.recording.naming import (
+    TAKE,
+    UNFINISHED,
+    file_name,
+    free_path,
+    is_unfinished,
+    same_name,
+    take_stem,
+)
+from handstudio.recording.notes import Notes, load_notes, notes_path
 from handstudio.recording.take import Take, open_take
-from handstudio.recording.writer import UNFINISHED
 
-_FORBIDDEN = re.compile(r"[^\w\-+.]+")
+Stamp: TypeAlias = tuple[int, int, int]
+"""Time of the last change [ns], size [bytes] and number of a file; zeros where there is none."""
+
+_NO_FILE: Stamp = (0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A file of the library: a take, or why it cannot be opened."""
+    """A file of the library: a take, or why it cannot be opened.
+
+    Attributes:
+        path: The file; its name is the take's name on screen, whatever the header says.
+        take: The take; None where it cannot be opened.
+        error: Why not, and what to do about it.
+        recording: Whether the file is being written now, here or by another program.
+        notes: What a person added.
+        notes_error: Why the notes cannot be read; they count as empty then.
+        stamp: State of the file when it was read.
+        notes_stamp: The same of the notes.
+    """
 
     path: Path
     take: Take | None
     error: HandstudioError | None = None
+    recording: bool = False
+    notes: Notes = Notes()
+    notes_error: HandstudioError | None = None
+    stamp: Stamp = _NO_FILE
+    notes_stamp: Stamp = _NO_FILE
 
     @property
     def problem(self) -> str:
@@ -37,6 +68,21 @@ class Entry:
     def remedy(self) -> str:
         """What to do about that, in English; empty where there is nothing to do."""
         return "" if self.error is None else self.error.remedy
+
+    @property
+    def subject(self) -> str:
+        """Code of the person: the name of the folder."""
+        return self.path.parent.parent.name
+
+    @property
+    def visit(self) -> str:
+        """The visit: a day, or its name."""
+        return self.path.parent.name
+
+    @property
+    def name(self) -> str:
+        """The take's name: its file's."""
+        return take_stem(self.path)
 
 
 def sessions_folder(chosen: Path | None = None) -> Path:
@@ -49,56 +95,141 @@ def sessions_folder(chosen: Path | None = None) -> Path:
     return platformdirs.user_data_path("handstudio", appauthor=False) / "sessions"
 
 
-def entries(sessions: Path) -> list[Entry]:
-    """Every take and every interrupted recording, newest first."""
-    found = [*sessions.glob("*/*/*.mcap"), *sessions.glob(f"*/*/*.mcap{UNFINISHED}")]
-    return [_entry(path) for path in sorted(found, key=_age, reverse=True)]
+def entries(sessions: Path, known: Iterable[Entry] = ()) -> list[Entry]:
+    """Every take and every interrupted recording, newest first.
+
+    Args:
+        sessions: The library.
+        known: What was listed before: of this, only files that changed since are read again.
+    """
+    settle(sessions)
+    before = {entry.path: entry for entry in known}
+    found = [_entry(path, before.get(path)) for path in take_files(sessions)]
+    return sorted(found, key=lambda entry: (entry.stamp[0], entry.path), reverse=True)
 
 
-def new_take_path(sessions: Path, subject: str, name: str, now: datetime) -> Path:
-    """A path no take has yet; a number is added to a name that is taken.
+def take_files(sessions: Path) -> list[Path]:
+    """The file of every take and every interrupted recording, in no order."""
+    return [
+        Path(file.path)
+        for subject in folders(sessions)
+        for visit in folders(subject)
+        for file in _scan(visit)
+        if file.name.endswith((TAKE, TAKE + UNFINISHED)) and not file.name.startswith(".")
+    ]
+
+
+def folders(parent: Path) -> list[Path]:
+    """The folders in a folder, by name, without hidden ones; none where it cannot be read."""
+    found = [Path(each.path) for each in _scan(parent) if each.is_dir()]
+    return sorted(path for path in found if not path.name.startswith("."))
+
+
+def subject_folder(sessions: Path, code: str) -> Path:
+    """Where a subject's takes lie: the folder there is, also if it is written ``s01`` for ``S01``.
 
     Raises:
-        TakeError: subject or name leave nothing to call a file.
+        TakeError: the code leaves nothing to call a folder.
     """
-    folder = sessions / file_name(subject, "subject") / f"{now:%Y-%m-%d}"
-    stem = file_name(name, "take")
-    candidates = [stem, *(f"{stem}-{n}" for n in range(2, 10_000))]
-    for candidate in candidates:
-        path = folder / f"{candidate}.mcap"
-        if not path.exists() and not path.with_name(path.name + UNFINISHED).exists():
-            return path
+    return _folder_called(sessions, file_name(code, "subject"))
+
+
+def new_take_path(sessions: Path, subject: str, name: str, now: datetime, visit: str = "") -> Path:
+    """A path no take has yet; a number is added to a name that is taken.
+
+    Args:
+        sessions: The library.
+        subject: Code of the person.
+        name: What to call the take.
+        now: The day of the visit.
+        visit: Name of the visit, where it is not the day.
+
+    Raises:
+        TakeError: subject, visit or name leave nothing to call a file.
+    """
+    home = subject_folder(sessions, subject)
+    called = file_name(visit, "visit") if visit.strip() else f"{now:%Y-%m-%d}"
+    return free_path(_folder_called(home, called) / f"{file_name(name, 'take')}{TAKE}")
+
+
+def located(sessions: Path, path: Path) -> Path:
+    """A file of the library as the library writes its path.
+
+    Raises:
+        TakeError: it lies elsewhere.
+    """
+    real = path.parent.resolve() / path.name
+    for inside, root in ((_absolute(path), _absolute(sessions)), (real, sessions.resolve())):
+        if inside.is_relative_to(root):
+            parts = inside.relative_to(root).parts
+            if len(parts) == 3 and not any(part.startswith(".") for part in parts[:2]):
+                return sessions.joinpath(*parts)
     raise TakeError(
-        "{folder}: ten thousand takes are called {name}.",
-        "Choose another name.",
-        folder=folder,
-        name=stem,
+        "{path}: is no take of the library {sessions}.",
+        "Choose one of its takes, or the library it is in (--sessions FOLDER).",
+        path=path,
+        sessions=sessions,
     )
 
 
-def file_name(text: str, what: Literal["subject", "take"]) -> str:
-    """Words as a file name that every system accepts; letters of any language stay.
+def _entry(path: Path, before: Entry | None) -> Entry:
+    stamp, notes_stamp = _stamp(path), _stamp(notes_path(path))
+    fresh = before is not None and (before.stamp, before.notes_stamp) == (stamp, notes_stamp)
+    if before is not None and fresh and not is_unfinished(path):
+        return before
+    take, error = _opened(path)
+    notes, notes_error = _noted(path)
+    return Entry(
+        path,
+        take,
+        error,
+        is_unfinished(path) and is_held(path),
+        notes,
+        notes_error,
+        stamp,
+        notes_stamp,
+    )
 
-    Raises:
-        TakeError: nothing is left.
-    """
-    clean = _FORBIDDEN.sub("_", text.strip()).strip("._")[:80]
-    if clean:
-        return clean
-    if what == "subject":
-        raise TakeError("The subject has no name.", "Type a name with letters or digits.")
-    raise TakeError("The take has no name.", "Type a name with letters or digits.")
 
-
-def _entry(path: Path) -> Entry:
+def _opened(path: Path) -> tuple[Take | None, HandstudioError | None]:
+    if is_unfinished(path) and is_held(path):
+        what = "{path}: is being recorded."
+        return None, TakeError(what, "End the recording to open it.", path=path)
     try:
-        return Entry(path, open_take(path))
+        return open_take(path), None
     except HandstudioError as error:
-        return Entry(path, None, error)
+        return None, error
 
 
-def _age(path: Path) -> float:
+def _noted(path: Path) -> tuple[Notes, HandstudioError | None]:
     try:
-        return path.stat().st_mtime
+        return load_notes(path), None
+    except HandstudioError as error:
+        return Notes(), error
+
+
+def _folder_called(parent: Path, name: str) -> Path:
+    if (parent / name).is_dir():
+        return parent / name
+    alike = (folder for folder in folders(parent) if same_name(folder.name, name))
+    return next(alike, parent / name)
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        status = path.stat()
     except OSError:
-        return 0.0
+        return _NO_FILE
+    return status.st_mtime_ns, status.st_size, status.st_ino
+
+
+def _scan(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as found:
+            return list(found)
+    except OSError:
+        return []
+
+
+def _absolute(path: Path) -> Path:
+    return Path(os.path.abspath(path))  # noqa: PTH100 - links stay as they are

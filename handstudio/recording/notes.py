@@ -1,13 +1,22 @@
-"""Notes beside a take: labels and words added later. The take itself never changes."""
+"""Notes beside a take: labels, marks and words added later. The take itself never changes.
+
+They may be written while the take is still being recorded: they lie where its closed file looks.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import math
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
 from handstudio.errors import TakeError
 from handstudio.recording.atomic import BACKUP, write_atomically
+from handstudio.recording.naming import closed_path
+
+_Item = TypeVar("_Item")
 
 
 class Label(msgspec.Struct, frozen=True):
@@ -18,16 +27,71 @@ class Label(msgspec.Struct, frozen=True):
     label: str
 
 
-class Notes(msgspec.Struct, frozen=True):
-    """Everything a person added to a take."""
+class Mark(msgspec.Struct, frozen=True):
+    """A moment worth finding again, seconds from the first instant; it may have no words."""
 
-    labels: tuple[Label, ...] = ()
+    at_s: float
     text: str = ""
 
 
+class Notes(msgspec.Struct, frozen=True):
+    """Everything a person added to a take; labels and marks in order of time."""
+
+    labels: tuple[Label, ...] = ()
+    text: str = ""
+    marks: tuple[Mark, ...] = ()
+
+
+def with_text(notes: Notes, text: str) -> Notes:
+    """Notes with other words."""
+    return msgspec.structs.replace(notes, text=text)
+
+
+def with_mark(notes: Notes, at_s: float, text: str = "") -> Notes:
+    """Notes with one more mark.
+
+    Raises:
+        TakeError: the time is no number.
+    """
+    _refuse_no_time(at_s)
+    marks = sorted((*notes.marks, Mark(at_s, text)), key=lambda mark: mark.at_s)
+    return msgspec.structs.replace(notes, marks=tuple(marks))
+
+
+def without_mark(notes: Notes, mark: Mark) -> Notes:
+    """Notes without this mark; as they are where it is gone already."""
+    return msgspec.structs.replace(notes, marks=_without(notes.marks, mark))
+
+
+def with_label(notes: Notes, start_s: float, end_s: float, label: str) -> Notes:
+    """Notes with one more named stretch; begin and end in either order.
+
+    Raises:
+        TakeError: it has no name or no length, or a time is no number.
+    """
+    _refuse_no_time(start_s)
+    _refuse_no_time(end_s)
+    if not label.strip():
+        raise TakeError("The stretch has no name.", "Type what happens in it.")
+    if start_s == end_s:
+        raise TakeError(
+            "The stretch begins and ends at {at_s} s.",
+            "Choose a begin and an end, or set a mark there.",
+            at_s=f"{start_s:.2f}",
+        )
+    new = Label(min(start_s, end_s), max(start_s, end_s), label.strip())
+    labels = sorted((*notes.labels, new), key=lambda each: (each.start_s, each.end_s))
+    return msgspec.structs.replace(notes, labels=tuple(labels))
+
+
+def without_label(notes: Notes, label: Label) -> Notes:
+    """Notes without this named stretch; as they are where it is gone already."""
+    return msgspec.structs.replace(notes, labels=_without(notes.labels, label))
+
+
 def notes_path(take: Path) -> Path:
-    """Where the notes of a take live."""
-    return take.with_suffix(".notes.json")
+    """Where the notes of a take live, be it closed or still ``NAME.mcap.recording``."""
+    return closed_path(take).with_suffix(".notes.json")
 
 
 def load_notes(take: Path) -> Notes:
@@ -73,3 +137,23 @@ def save_notes(take: Path, notes: Notes) -> None:
             path=path,
             reason=error.strerror or error,
         ) from error
+
+
+def copy_notes(take: Path, other: Path) -> None:
+    """Give another take the notes of this one; nothing where there are none to be had."""
+    with contextlib.suppress(TakeError):
+        notes = load_notes(take)
+        if notes != Notes():
+            save_notes(other, notes)
+
+
+def _refuse_no_time(at_s: float) -> None:
+    if not math.isfinite(at_s):
+        raise TakeError("{at_s} is no time in a take.", "Choose a time in seconds.", at_s=at_s)
+
+
+def _without(items: tuple[_Item, ...], one: _Item) -> tuple[_Item, ...]:
+    if one not in items:
+        return items
+    at = items.index(one)
+    return items[:at] + items[at + 1 :]

@@ -16,8 +16,10 @@ from handstudio.recording.header import (
     decode_header,
     sound_state,
 )
+from handstudio.recording.naming import take_stem
+from handstudio.recording.notes import copy_notes
 from handstudio.recording.take import DAMAGE, records_until_damage
-from handstudio.recording.writer import UNFINISHED, TakeWriter
+from handstudio.recording.writer import TakeWriter
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +36,12 @@ def recover(path: Path) -> Recovered:
     """Make a whole take of all that was flushed before a recording stopped.
 
     The damaged file stays where it is; the new one stands beside it, named
-    ``NAME-recovered.mcap``.
+    ``NAME-recovered.mcap``, with a copy of the notes.
 
     Raises:
         TakeError: nothing of a take can be read from this file, or the new one exists already.
     """
-    target = path.with_name(f"{_stem(path)}-recovered.mcap")
+    target = path.with_name(f"{take_stem(path)}-recovered.mcap")
     records = _readable(path)
     header, state = _beginning(records, path)
     writer = TakeWriter(target, header, state)
@@ -53,6 +55,7 @@ def recover(path: Path) -> Recovered:
     except BaseException:
         writer.discard()  # a copy of a part: the damaged file still has it all
         raise
+    copy_notes(path, target)
     duration = (last - first) * 1e-9 if first is not None and last is not None else 0.0
     return Recovered(target, writer.chunks, writer.bytes, duration)
 
@@ -85,7 +88,3 @@ def _beginning(records: Iterator[McapRecord], path: Path) -> tuple[Header, bytes
         "If it was recorded elsewhere, copy it again: the copy may be cut short.",
         path=path,
     )
-
-
-def _stem(path: Path) -> str:
-    return path.name.removesuffix(UNFINISHED).removesuffix(".mcap")

@@ -29,8 +29,8 @@ from handstudio.recording.header import (
     decode_summary,
     sound_state,
 )
+from handstudio.recording.naming import UNFINISHED
 from handstudio.recording.samples_message import decode_samples
-from handstudio.recording.writer import UNFINISHED
 from handstudio.samples import Event
 from handstudio.stream import EventStream
 

@@ -26,15 +26,14 @@ from handstudio.recording.header import (
     encode_header,
     encode_summary,
 )
+from handstudio.recording.held import hold
+from handstudio.recording.naming import UNFINISHED
 from handstudio.recording.samples_message import encode_samples
 from handstudio.samples import ImuSamples
 
 FLUSH_S = 0.25
 """How often a recording is handed to the operating system, by the clock and by the times of what is
 written: the most a crash can cost."""
-
-UNFINISHED = ".recording"
-"""Suffix of a take that is being written, or was when the computer went down."""
 
 
 class TakeWriter:
@@ -124,13 +123,15 @@ class TakeWriter:
         with self._saying_what_to_do():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             try:
-                return self._unfinished.open("xb")
+                stream = self._unfinished.open("xb")
             except FileExistsError as error:
                 raise TakeError(
                     "{path} is there already: an interrupted recording.",
                     "Recover it first (handstudio recover '{path}'), or record under another name.",
                     path=self._unfinished,
                 ) from error
+            hold(stream)  # so that nobody takes it for an interrupted one
+            return stream
 
     def _begin(self, header: Header, first_state: bytes) -> None:
         with self._saying_what_to_do():
