@@ -15,6 +15,8 @@ from typing import Annotated, Any, Literal
 import msgspec
 import tyro
 
+from handstudio.commands import keeping
+from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
@@ -27,20 +29,12 @@ from handstudio.recording.header import Header
 from handstudio.recording.raw_import import import_folder
 from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.simulated import simulate as simulate_take
+from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.setup import HandModel, filter_named
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
-Sessions = Annotated[
-    Path | None, tyro.conf.arg(help="Folder of the takes (default: ./sessions in a checkout)")
-]
-Json = Annotated[bool, tyro.conf.arg(help="Print JSON for a program instead of words")]
-TakeFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TAKE.mcap")]
-
 CONNECT_S = 25.0
-
-HAND_MM = (50.0, 400.0)
-"""Lengths that a hand may have, and metres or inches have not."""
 
 
 def studio(
@@ -87,6 +81,7 @@ def record(
     *,
     seconds: float | None = None,
     subject: str = "S01",
+    visit: str = "",
     name: str = "take",
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
     sessions: Sessions = None,
@@ -98,6 +93,7 @@ def record(
         address: The device (handstudio devices lists them; virtual: is always there).
         seconds: How long; until Ctrl-C unless given.
         subject: Code of the person.
+        visit: Name of the visit; the day unless given.
         name: Name of the take.
         hand_length_mm: Wrist crease to the tip of the middle finger.
         sessions: Folder of the takes.
@@ -109,7 +105,7 @@ def record(
         )
     hand = _hand(hand_length_mm)
     path = library.new_take_path(
-        library.sessions_folder(sessions), subject, name, datetime.now().astimezone()
+        library.sessions_folder(sessions), subject, name, datetime.now().astimezone(), visit
     )
     capture = Capture()
     capture.start()
@@ -284,6 +280,12 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "import": import_,
     "recover": recover,
     "simulate": simulate,
+    "takes": keeping.takes,
+    "rename": keeping.rename,
+    "bin": keeping.bin,
+    "restore": keeping.restore,
+    "subjects": keeping.subjects,
+    "delete-subject": keeping.delete_subject,
 }
 
 

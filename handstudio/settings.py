@@ -7,7 +7,6 @@ never the start of the studio.
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import re
 from collections.abc import Mapping
@@ -271,9 +270,6 @@ def _checked(values: dict[str, Any], file: Path) -> tuple[Settings, HandstudioEr
 
 
 def _converted(name: str, value: Any, kind: Any) -> Any:
-    if name == "shown" and isinstance(value, dict):
-        known = {key: flag for key, flag in value.items() if isinstance(flag, bool)}
-        return msgspec.convert(known, Shown)
     converted = msgspec.convert(value, kind)
     if isinstance(converted, str) and len(converted) > _LONGEST:
         raise ValueError("too long")
@@ -286,7 +282,7 @@ def _clamped(name: str, value: Any) -> Any:
     if name not in LIMITS:
         return value
     least, most = LIMITS[name]
-    return min(max(value, least), most) if math.isfinite(value) else least
+    return min(max(value, least), most)
 
 
 def _stored(path: Path) -> dict[str, Any]:

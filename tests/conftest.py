@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -35,6 +36,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason="takes minutes: run with --long"))
         if item.get_closest_marker("real") and not os.environ.get(DATA_VARIABLE):
             item.add_marker(pytest.mark.skip(reason=_no_data()))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def settings_of_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test touches what the studio remembers for the person who runs it."""
+    with pytest.MonkeyPatch.context() as patch:
+        file = tmp_path_factory.mktemp("settings") / "settings.json"
+        patch.setenv("HANDSTUDIO_SETTINGS", str(file))
+        yield
 
 
 @pytest.fixture(scope="session")

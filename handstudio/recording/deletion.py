@@ -101,6 +101,7 @@ def delete_subject(sessions: Path, code: str, typed: str) -> Removal:
     removal = what_deleting_removes(sessions, code)
     for place in _places(sessions, code):
         _remove(place)
+    settle(sessions)  # what was written down of moves names the subject too
     _tidy(sessions)
     left = [file for place in _places(sessions, code) for file in (*_files(place), place)]
     if left:
@@ -126,7 +127,8 @@ def _code(sessions: Path, code: str) -> str:
 
 
 def _places(sessions: Path, code: str) -> list[Path]:
-    roots = [sessions, *folders(sessions / bin_.FOLDER)]
+    """Where there is something of a subject; its own folder last, by which it is still found."""
+    roots = [*folders(sessions / bin_.FOLDER), sessions]
     return [folder for root in roots for folder in folders(root) if folder.name == code]
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeAlias
 
@@ -83,6 +83,16 @@ class Entry:
     def name(self) -> str:
         """The take's name: its file's."""
         return take_stem(self.path)
+
+    @property
+    def start(self) -> datetime | None:
+        """When the recording began, UTC; None where it is not known."""
+        if self.take is None:
+            return None
+        try:
+            return datetime.fromtimestamp(self.take.header.start_utc_ns * 1e-9, UTC)
+        except (OverflowError, OSError, ValueError):  # a clock that was never set
+            return None
 
 
 def sessions_folder(chosen: Path | None = None) -> Path:

@@ -160,7 +160,7 @@ def _settle_one(sessions: Path, record: Path) -> None:
 def _read(sessions: Path, data: bytes) -> list[Pair]:
     try:
         steps = msgspec.json.decode(data, type=list[_Step])
-    except msgspec.MsgspecError:
+    except ValueError:
         return []
     names = [PurePosixPath(name) for step in steps for name in (step.source, step.target)]
     if any(name.is_absolute() or ".." in name.parts for name in names):

@@ -108,7 +108,7 @@ def load_notes(take: Path) -> Notes:
             return msgspec.json.decode(candidate.read_bytes(), type=Notes)
         except FileNotFoundError:
             continue
-        except (OSError, msgspec.MsgspecError) as error:
+        except (OSError, ValueError) as error:  # ValueError: no JSON, or no UTF-8
             problem = problem or error
     if problem is None:
         return Notes()

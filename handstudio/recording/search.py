@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable
-from datetime import datetime
 
 from handstudio.recording.library import Entry
 
@@ -32,10 +31,7 @@ def _told(entry: Entry) -> list[str]:
 
 
 def _day(entry: Entry) -> str:
-    if entry.take is None:
-        return ""
-    start = datetime.fromtimestamp(entry.take.header.start_utc_ns * 1e-9).astimezone()
-    return f"{start:%Y-%m-%d}"
+    return f"{entry.start.astimezone():%Y-%m-%d}" if entry.start else ""
 
 
 def _plain(text: str) -> str:

@@ -139,7 +139,7 @@ def _read(folder: Path) -> Subject:
             read = msgspec.json.decode(candidate.read_bytes(), type=Subject)
         except FileNotFoundError:
             continue
-        except (OSError, msgspec.MsgspecError) as error:
+        except (OSError, ValueError) as error:  # ValueError: no JSON, or no UTF-8
             problem = problem or error
         else:
             return msgspec.structs.replace(read, code=folder.name)

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from handstudio.errors import TakeError
-from handstudio.recording.library import entries, file_name, new_take_path, sessions_folder
+from handstudio.recording import library
+from handstudio.recording.library import entries, new_take_path, sessions_folder
+from handstudio.recording.naming import file_name
+from handstudio.recording.notes import Notes, save_notes
 from handstudio.recording.writer import UNFINISHED, TakeWriter
 
 NOW = datetime(2026, 3, 4, 23, 59)
@@ -87,3 +90,42 @@ def test_takes_live_where_one_chose_or_in_the_checkout_or_with_the_user(tmp_path
     assert sessions_folder() != tmp_path / "sessions"  # any folder of that name is not enough
     (tmp_path / "pyproject.toml").touch()
     assert sessions_folder() == tmp_path / "sessions"
+
+
+def test_only_what_changed_is_read_again(tmp_path, written, monkeypatch):
+    visit = tmp_path / "S01" / "day"
+    paths = [written(visit / f"{name}.mcap") for name in "abc"]
+    read: list[str] = []
+    real = library.open_take
+    monkeypatch.setattr(library, "open_take", lambda path: read.append(path.name) or real(path))
+    first = entries(tmp_path)
+    assert sorted(read) == ["a.mcap", "b.mcap", "c.mcap"]
+    read.clear()
+    second = entries(tmp_path, first)
+    assert second == first
+    assert read == []
+    save_notes(paths[1], Notes((), "new words"))
+    paths[2].unlink()
+    paths[0].write_bytes(paths[0].read_bytes()[:-200])
+    third = {entry.name: entry for entry in entries(tmp_path, second)}
+    assert sorted(read) == ["a.mcap", "b.mcap"]
+    assert third.keys() == {"a", "b"}
+    assert third["a"].take is None
+    assert third["b"].notes.text == "new words"
+
+
+def test_notes_that_cannot_be_read_do_not_hide_their_take(tmp_path, written):
+    path = written(tmp_path / "S01" / "day" / "a.mcap")
+    path.with_suffix(".notes.json").write_bytes(b'{"text": "\xff"}')
+    (entry,) = entries(tmp_path)
+    assert entry.take is not None
+    assert entry.notes == Notes()
+    assert entry.notes_error is not None
+    assert "cannot be read" in entry.notes_error.what
+
+
+def test_hidden_folders_hold_no_takes(tmp_path, written):
+    written(tmp_path / ".bin" / "S01" / "a.mcap")
+    written(tmp_path / "S01" / ".trash" / "b.mcap")
+    written(tmp_path / "S01" / "day" / ".c.mcap")
+    assert entries(tmp_path) == []

@@ -9,7 +9,19 @@ import pytest
 
 from handstudio.errors import TakeError
 from handstudio.recording.atomic import write_atomically
-from handstudio.recording.notes import Label, Notes, load_notes, notes_path, save_notes
+from handstudio.recording.notes import (
+    Label,
+    Mark,
+    Notes,
+    load_notes,
+    notes_path,
+    save_notes,
+    with_label,
+    with_mark,
+    with_text,
+    without_label,
+    without_mark,
+)
 
 ONE = Notes((Label(0.5, 1.25, "static"), Label(2.0, 3.0, "index_mcp:flexion")), "左手 ok")
 TWO = Notes((), "later")
@@ -39,7 +51,9 @@ def test_the_notes_before_stay_as_a_backup_and_nothing_else_is_left(take):
     assert names == {"squeeze.v2.notes.json", "squeeze.v2.notes.json.bak"}
 
 
-@pytest.mark.parametrize("damage", [b"", b'{"labels": [', b"\xff\xfe", b'{"labels": 5}'])
+@pytest.mark.parametrize(
+    "damage", [b"", b'{"labels": [', b"\xff\xfe", b'{"labels": 5}', b'{"text": "\xff"}']
+)
 def test_where_the_notes_are_damaged_the_backup_is_read(take, damage):
     save_notes(take, ONE)
     save_notes(take, TWO)
@@ -100,3 +114,45 @@ def test_what_is_written_atomically_replaces_the_whole(tmp_path):
 
 def _crash(*_: object) -> None:
     raise KeyboardInterrupt
+
+
+def test_marks_and_stretches_come_and_go_in_order_of_time():
+    notes = with_mark(with_mark(Notes(), 2.0), 0.5, "起点")
+    assert notes.marks == (Mark(0.5, "起点"), Mark(2.0))
+    assert without_mark(notes, Mark(2.0)).marks == (Mark(0.5, "起点"),)
+    assert without_mark(notes, Mark(9.0)) == notes
+    labelled = with_label(with_label(notes, 3.0, 1.0, " grasp "), 0.0, 0.5, "rest")
+    assert labelled.labels == (Label(0.0, 0.5, "rest"), Label(1.0, 3.0, "grasp"))
+    assert without_label(labelled, Label(1.0, 3.0, "grasp")).labels == (Label(0.0, 0.5, "rest"),)
+    assert with_text(labelled, "ok") == Notes(labelled.labels, "ok", notes.marks)
+
+
+def test_of_two_marks_that_are_the_same_one_is_removed():
+    notes = with_mark(with_mark(Notes(), 1.0), 1.0)
+    assert without_mark(notes, Mark(1.0)).marks == (Mark(1.0),)
+
+
+@pytest.mark.parametrize("at_s", [float("nan"), float("inf")])
+def test_what_is_no_time_is_refused(at_s):
+    with pytest.raises(TakeError, match="no time in a take"):
+        with_mark(Notes(), at_s)
+    with pytest.raises(TakeError, match="no time in a take"):
+        with_label(Notes(), 0.0, at_s, "x")
+
+
+def test_a_stretch_has_a_name_and_a_length():
+    with pytest.raises(TakeError, match="no name"):
+        with_label(Notes(), 0.0, 1.0, "  ")
+    with pytest.raises(TakeError, match=r"begins and ends at 1\.00 s"):
+        with_label(Notes(), 1.0, 1.0, "x")
+
+
+def test_notes_of_before_marks_can_be_read(take):
+    old = b'{"labels": [{"start_s": 0.5, "end_s": 1.25, "label": "static"}], "text": "ok"}'
+    notes_path(take).write_bytes(old)
+    assert load_notes(take) == Notes((Label(0.5, 1.25, "static"),), "ok")
+
+
+def test_notes_of_a_recording_lie_where_its_closed_take_looks(take):
+    save_notes(take.with_name(f"{take.name}.recording"), ONE)
+    assert load_notes(take) == ONE

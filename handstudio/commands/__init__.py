@@ -1,0 +1,1 @@
+"""Commands of the shell, by subject; `handstudio.cli` gathers them."""
