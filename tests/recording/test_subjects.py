@@ -267,6 +267,6 @@ def test_a_crash_in_the_middle_leaves_a_subject_that_can_be_deleted(sessions, tr
                     assert (sessions / "S01").exists()
                     continue
         break
-    assert steps > 10
+    assert steps > 4  # each time some more were removed
     assert named(sessions, "S01") == []
     assert len(entries(sessions)) == len(list_bin(sessions)) == 1
