@@ -261,8 +261,8 @@ def _checked(values: dict[str, Any], file: Path) -> tuple[Settings, HandstudioEr
     if not wrong:
         return Settings(**good), None
     notice = SettingsError(
-        "{path}: makes no sense for {names}.",
-        "The nearest value that does is used; choose anew in the settings.",
+        "{path}: the values of {names} make no sense.",
+        "The nearest that does is used, or the default; choose anew in the settings.",
         path=file,
         names=", ".join(wrong),
     )

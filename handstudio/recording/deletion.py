@@ -92,7 +92,7 @@ def delete_subject(sessions: Path, code: str, typed: str) -> Removal:
     code = _code(sessions, code)
     if typed != code:
         raise TakeError(
-            "{typed!r} was typed, the subject is {code}.",
+            "“{typed}” was typed, the subject is {code}.",
             "Type the code exactly as it is shown to delete everything of this subject.",
             typed=typed,
             code=code,

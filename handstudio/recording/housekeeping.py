@@ -61,7 +61,7 @@ def rename_take(sessions: Path, take: Path, name: str) -> UndoRename:
     settle(sessions)
     if is_unfinished(path):
         raise TakeError(
-            "{path}: is no closed take.",
+            "{path}: is a recording that is not closed.",
             "End the recording, or recover it where it was interrupted, then rename the take.",
             path=path,
         )

@@ -203,8 +203,9 @@ def _entry(path: Path, before: Entry | None) -> Entry:
 
 def _opened(path: Path) -> tuple[Take | None, HandstudioError | None]:
     if is_unfinished(path) and is_held(path):
-        what = "{path}: is being recorded."
-        return None, TakeError(what, "End the recording to open it.", path=path)
+        return None, TakeError(
+            "{path}: is being recorded.", "End the recording to open it.", path=path
+        )
     try:
         return open_take(path), None
     except HandstudioError as error:

@@ -75,9 +75,9 @@ def with_label(notes: Notes, start_s: float, end_s: float, label: str) -> Notes:
         raise TakeError("The stretch has no name.", "Type what happens in it.")
     if start_s == end_s:
         raise TakeError(
-            "The stretch begins and ends at {at_s} s.",
+            "The stretch begins and ends at {at_s:.2f} s.",
             "Choose a begin and an end, or set a mark there.",
-            at_s=f"{start_s:.2f}",
+            at_s=start_s,
         )
     new = Label(min(start_s, end_s), max(start_s, end_s), label.strip())
     labels = sorted((*notes.labels, new), key=lambda each: (each.start_s, each.end_s))

@@ -146,10 +146,10 @@ def _read(folder: Path) -> Subject:
     if problem is None:
         return Subject(folder.name)
     raise TakeError(
-        "{path}: what is known of the subject cannot be read ({problem}).",
+        "{path}: what is known of the subject cannot be read ({reason}).",
         "Enter side and length of the hand again; the takes are not touched.",
         path=path,
-        problem=problem,
+        reason=problem,
     )
 
 
@@ -172,10 +172,10 @@ def _refuse_length(length_mm: float | None) -> None:
     shortest, longest = HAND_MM
     if length_mm is not None and not shortest <= length_mm <= longest:
         raise TakeError(
-            "A hand is not {length} mm long.",
+            "A hand is not {length:g} mm long.",
             "Give it in millimetres, from the wrist crease to the tip of the middle finger: "
-            "{shortest} to {longest}.",
-            length=f"{length_mm:g}",
-            shortest=f"{shortest:g}",
-            longest=f"{longest:g}",
+            "{shortest:g} to {longest:g}.",
+            length=length_mm,
+            shortest=shortest,
+            longest=longest,
         )
