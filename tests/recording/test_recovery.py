@@ -12,6 +12,7 @@ import msgspec
 import pytest
 
 from handstudio.errors import HandstudioError, TakeError
+from handstudio.recording.notes import Mark, Notes, load_notes, save_notes
 from handstudio.recording.recovery import recover
 from handstudio.recording.take import FirstState, open_take
 from handstudio.recording.writer import UNFINISHED, TakeWriter
@@ -215,3 +216,13 @@ def test_where_there_is_no_room_for_the_recovered_take_one_can_try_again(
 
 def _full(*_: object) -> None:
     raise TakeError("no room", "make some")
+
+
+def test_what_was_noted_while_it_was_recorded_is_with_the_recovered_take(tmp_path, header):
+    path = tmp_path / "squeeze.mcap"
+    writer = TakeWriter(path, header)
+    save_notes(path, Notes((), "left hand", (Mark(0.1, "tremor"),)))
+    writer.abandon()
+    cut = path.with_name(path.name + UNFINISHED)
+    assert load_notes(recover(cut).path) == load_notes(cut) == load_notes(path)
+    assert load_notes(path).text == "left hand"

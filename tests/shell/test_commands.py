@@ -22,7 +22,8 @@ def recorded(handstudio, tmp_path_factory) -> Path:
     sessions = tmp_path_factory.mktemp("sessions")
     said = handstudio(
         *["record", "virtual:?seed=7", "--seconds", 2, "--sessions", sessions],
-        *["--subject", "P07", "--name", "grasp", "--hand-length-mm", 171, "--json"],
+        *["--subject", "P07", "--visit", "first", "--name", "grasp"],
+        *["--hand-length-mm", 171, "--json"],
     )
     assert said.code == 0, said.err
     return Path(said.json["path"])
@@ -94,8 +95,7 @@ def test_devices_are_listed_for_persons(handstudio):
 
 
 def test_a_recording_is_a_take_of_the_library_and_of_that_length(handstudio, recorded):
-    assert recorded.parent.parent.name == "P07"
-    assert recorded.name == "grasp.mcap"
+    assert recorded.parts[-3:] == ("P07", "first", "grasp.mcap")
     said = handstudio("info", recorded, "--json").json
     assert said["path"] == str(recorded)
     assert said["header"]["subject"] == "P07"
