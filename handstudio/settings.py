@@ -156,7 +156,6 @@ class SettingsStore:
     Attributes:
         path: The file.
         settings: As they are now.
-        notices: What a person should know; take them with `take_notice`.
     """
 
     path: Path

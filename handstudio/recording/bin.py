@@ -18,7 +18,7 @@ from handstudio.errors import TakeError
 from handstudio.recording.held import is_held
 from handstudio.recording.library import folders, located, take_files
 from handstudio.recording.moves import move, settle
-from handstudio.recording.naming import belongings, free_path, is_unfinished, take_stem
+from handstudio.recording.naming import belongings, cut, free_path, is_unfinished, take_stem
 
 FOLDER = ".bin"
 
@@ -76,7 +76,7 @@ def move_to_bin(sessions: Path, take: Path, now: datetime) -> UndoBin:
         raise TakeError(
             "{path}: is being recorded.", "End the recording, then put it in the bin.", path=path
         )
-    entry = _free_entry(sessions, f"{now.astimezone(UTC):{_STAMP}}-{take_stem(path)}")
+    entry = _free_entry(sessions, f"{now.astimezone(UTC):{_STAMP}}-{cut(take_stem(path))}")
     target = entry / path.parent.relative_to(sessions)
     try:
         move(sessions, [(each, target / each.name) for each in belongings(path)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,7 +91,7 @@ def delete_subject(sessions: Path, code: str, typed: str) -> Removal:
     """
     settle(sessions)
     code = _code(sessions, code)
-    if typed != code:
+    if _composed(typed) != _composed(code):
         raise TakeError(
             "“{typed}” was typed, the subject is {code}.",
             "Type the code exactly as it is shown to delete everything of this subject.",
@@ -124,6 +125,10 @@ def _code(sessions: Path, code: str) -> str:
         if any(place.name == code for place in _places(sessions, code)):
             return code  # all its takes are in the bin
         raise
+
+
+def _composed(code: str) -> str:
+    return unicodedata.normalize("NFC", code)  # some systems write accents apart
 
 
 def _places(sessions: Path, code: str) -> list[Path]:

@@ -5,7 +5,9 @@ A hold ends with the process that has it, however that ends: what is left is an 
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -24,6 +26,26 @@ def hold(file: BinaryIO) -> bool:
     except OSError:
         return True  # a file system that knows no locks
     return True
+
+
+def movable(file: BinaryIO) -> None:
+    """Let an open file be moved: on Windows it has to be closed, which ends the hold."""
+    if sys.platform == "win32":
+        file.close()
+
+
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[bool]:
+    """Hold a file that is there; whether nobody else does. It may be moved and removed meanwhile.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    if sys.platform == "win32":
+        yield True
+        return
+    with path.open("rb") as file:
+        yield hold(file)
 
 
 def is_held(path: Path) -> bool:

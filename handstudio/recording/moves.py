@@ -16,7 +16,7 @@ from typing import BinaryIO
 import msgspec
 
 from handstudio.errors import TakeError
-from handstudio.recording.held import hold
+from handstudio.recording.held import held, hold, movable
 
 FOLDER = ".moves"
 
@@ -87,9 +87,10 @@ def _written_down(sessions: Path, steps: list[Pair]) -> Iterator[None]:
         hold(file)
         try:
             _write(file, sessions, steps)
+            movable(file)
             fresh.rename(record)
         except OSError:
-            fresh.unlink(missing_ok=True)
+            _forget(fresh)
             raise
         try:
             yield
@@ -100,7 +101,7 @@ def _written_down(sessions: Path, steps: list[Pair]) -> Iterator[None]:
 
 
 def _forget(record: Path) -> None:
-    with contextlib.suppress(OSError):  # it says what is done already: reading it again is harmless
+    with contextlib.suppress(OSError):  # nothing is left to do of what it says: it may stay a while
         record.unlink()
         record.parent.rmdir()
 
@@ -114,7 +115,11 @@ class _HalfwayError(Exception):
 
 def _write(file: BinaryIO, sessions: Path, steps: list[Pair]) -> None:
     told = [_Step(_inside(sessions, a), _inside(sessions, b)) for a, b in steps]
-    file.write(msgspec.json.encode(told))
+    try:
+        data = msgspec.json.encode(told)
+    except UnicodeError as error:
+        raise OSError(None, "its name is no UTF-8") from error
+    file.write(data)
     file.flush()
     os.fsync(file.fileno())
 
@@ -147,11 +152,11 @@ def _move_one(source: Path, target: Path) -> None:
 
 
 def _settle_one(sessions: Path, record: Path) -> None:
-    with record.open("rb") as file:
-        if not hold(file):
+    with held(record) as ours:
+        if not ours:
             return  # somebody is at it
         if record.suffix == ".json":
-            for source, target in _read(sessions, file.read()):
+            for source, target in _read(sessions, record.read_bytes()):
                 if source.exists() and not target.exists():
                     _move_one(source, target)
         record.unlink()

@@ -39,10 +39,16 @@ def file_name(text: str, what: Literal["subject", "visit", "take"]) -> str:
     """
     composed = unicodedata.normalize("NFC", text)
     allowed = "".join(sign if _may_stand(sign) else " " for sign in composed)
-    clean = _cut("_".join(allowed.split()).strip("._")).rstrip("._")
+    clean = cut("_".join(allowed.split()).strip("._")).rstrip("._")
     if not clean:
         raise _nameless(what)
     return f"_{clean}" if clean.split(".")[0].upper() in _DEVICES else clean
+
+
+def cut(text: str) -> str:
+    """The beginning of a text that is short enough for a name."""
+    characters, length = LONGEST
+    return text[:characters].encode(errors="ignore")[:length].decode(errors="ignore")
 
 
 def same_name(one: str, other: str) -> bool:
@@ -110,11 +116,6 @@ def _nameless(what: Literal["subject", "visit", "take"]) -> TakeError:
 def _may_stand(sign: str) -> bool:
     # accents and vowel signs are part of a letter in many languages
     return sign.isalnum() or sign in "_-+." or unicodedata.category(sign).startswith("M")
-
-
-def _cut(text: str) -> str:
-    characters, length = LONGEST
-    return text[:characters].encode()[:length].decode(errors="ignore")
 
 
 def _folded(name: str) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from handstudio.recording.bin import move_to_bin
 from handstudio.recording.held import hold, is_held
-from handstudio.recording.housekeeping import rename_take
+from handstudio.recording.housekeeping import rename_take, undo
 from handstudio.recording.library import entries
 from handstudio.recording.writer import UNFINISHED, TakeWriter
 
@@ -89,3 +89,18 @@ def test_who_lists_the_library_does_not_disturb_a_move_that_goes_on(
             move_to_bin(tmp_path, path, NOW)
     assert seen == [1] * 7  # until its own file goes, last, the take is there
     assert [entry.name for entry in entries(tmp_path)] == (["other"] if act == "rename" else [])
+
+
+def test_where_files_cannot_be_held_takes_move_all_the_same(tmp_path, taken, content, monkeypatch):
+    path = taken(tmp_path / "S01" / "day" / "squeeze.mcap")
+    before = content(tmp_path)
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert undo(tmp_path, rename_take(tmp_path, path, "other")) == path
+    assert undo(tmp_path, move_to_bin(tmp_path, path, NOW)) == path
+    (tmp_path / ".moves").mkdir()
+    (tmp_path / ".moves" / "x.json").write_text(
+        '[{"source": "S01/day/squeeze.mcap", "target": "S01/day/other.mcap"}]'
+    )
+    assert [entry.name for entry in entries(tmp_path)] == ["other"]
+    path.with_name("other.mcap").rename(path)
+    assert content(tmp_path) == before

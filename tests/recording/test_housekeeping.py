@@ -210,6 +210,24 @@ def test_the_bin_gives_back_everything_in_any_order(sessions, taken, content, pu
     assert content(sessions) == before
 
 
+@pytest.mark.parametrize("stem", ["手" * 80, "_", "CON", "é" * 100])
+def test_a_take_somebody_named_by_hand_comes_back_too(sessions, written, stem):
+    path = written(sessions / "S 01" / "day" / "x.mcap")
+    path = path.rename(path.with_name(f"{stem}.mcap"))
+    (entry,) = entries(sessions)
+    assert undo(sessions, move_to_bin(sessions, entry.path, NOW)) == path
+    assert undo(sessions, rename_take(sessions, path, "x")) == path
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are always Unicode")
+def test_a_name_that_is_no_unicode_is_refused_in_words(sessions, written):
+    path = written(sessions / "S01" / "day" / "x.mcap")
+    path = path.rename(path.with_name("odd\udcff.mcap"))
+    with pytest.raises(TakeError, match="its name is no UTF-8"):
+        move_to_bin(sessions, path, NOW)
+    assert len(entries(sessions)) == 1
+
+
 def test_where_its_place_is_taken_a_take_comes_back_beside_it(sessions, take, taken):
     key = move_to_bin(sessions, take, NOW).key
     taken(take)
