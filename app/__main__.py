@@ -11,7 +11,7 @@ from types import FrameType
 
 from app import intents
 from app.jobs import Jobs
-from app.server import Server
+from app.server import HOST, Server
 from app.studio import State, Studio
 from handstudio.device.capture import Capture
 from handstudio.shell import out
@@ -19,8 +19,20 @@ from handstudio.shell import out
 TICK_S = 1.0 / 60.0
 
 
-def run(sessions: Path, *, address: str | None, port: int, browser: bool) -> int:
-    """Serve the studio until Ctrl-C; ends a take that is on, so that nothing is lost."""
+def run(
+    sessions: Path,
+    *,
+    address: str | None,
+    port: int,
+    browser: bool,
+    host: str = HOST,
+    token: str | None = None,
+) -> int:
+    """Serve the studio until Ctrl-C; ends a take that is on, so that nothing is lost.
+
+    Raises:
+        HandstudioError: it cannot be served there.
+    """
     ended = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -32,10 +44,10 @@ def run(sessions: Path, *, address: str | None, port: int, browser: bool) -> int
     capture.start()
     try:
         studio = Studio(capture, jobs, State(sessions=sessions))
-        server = Server(studio, port)
-        out.print(f"handstudio is at {server.url}  (takes in {sessions})\nCtrl-C ends it.")
+        server = Server(studio, port, host, token)
+        _tell(server, sessions)
         if browser:
-            webbrowser.open(server.url)
+            webbrowser.open(server.browser_url())
         _begin(studio, address)
         _loop(studio, server, ended)
         server.close()
@@ -45,6 +57,16 @@ def run(sessions: Path, *, address: str | None, port: int, browser: bool) -> int
         for report in capture.reports():
             out.print(str(getattr(report, "path", report)))
     return 0
+
+
+def _tell(server: Server, sessions: Path) -> None:
+    links = server.links(for_a_person=out.is_terminal)
+    if server.door.asks:
+        out.print("\n  ".join(["handstudio is at", *links]) + f"\n(takes in {sessions})")
+        out.print("Who has such a link can use the studio. What is sent is not encrypted.")
+    else:
+        out.print(f"handstudio is at {links[0]}  (takes in {sessions})")
+    out.print("Ctrl-C ends it.")
 
 
 def _begin(studio: Studio, address: str | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -36,32 +37,50 @@ from handstudio.shell import err, out, print_error, print_json, print_table, pro
 
 CONNECT_S = 25.0
 
+TOKEN_VARIABLE = "HANDSTUDIO_TOKEN"
+"""Environment variable with the token that visitors of the page need."""
+
 
 def studio(
     *,
     virtual: bool = False,
     connect: str | None = None,
+    host: str = "127.0.0.1",
     port: int = 8765,
+    token: str | None = None,
     sessions: Sessions = None,
     browser: bool = True,
     language: Literal["en", "ja"] | None = None,
 ) -> int:
-    """Open the studio in the browser.
+    """Open the studio in the browser, for this machine only unless told otherwise.
 
     Args:
         virtual: Begin with the virtual glove.
         connect: Begin with this device (serial:/dev/ttyACM0, tcp:HOST:PORT, replay:TAKE.mcap).
+        host: Serve there: 0.0.0.0 for the whole network, or an address of this machine. Visitors
+            then need the link that is shown (docs/lan.md).
         port: Port of the page; the next free one is taken where this is in use.
+        token: What the link must hold, 16 characters or more; one is made for any host but
+            loopback. Others on this machine see arguments: HANDSTUDIO_TOKEN is the better way.
         sessions: Folder of the takes.
         browser: Open the page in the browser.
         language: English or Japanese; the system's unless given.
     """
-    from app import words  # noqa: PLC0415 - the page's libraries only where it is wanted
+    from app import guard, words  # noqa: PLC0415 - the page's libraries only where it is wanted
     from app.__main__ import run  # noqa: PLC0415
 
     address = connect or ("virtual:" if virtual else None)
     words.use_language(language)
-    return run(library.sessions_folder(sessions), address=address, port=port, browser=browser)
+    from_environment = os.environ.pop(TOKEN_VARIABLE, None)  # what we start need not have it
+    chosen = token if token is not None else from_environment or None
+    return run(
+        library.sessions_folder(sessions),
+        address=address,
+        port=port,
+        browser=browser,
+        host=host,
+        token=None if chosen is None else guard.checked_token(chosen),
+    )
 
 
 def devices(*, json: Json = False) -> int:
