@@ -39,6 +39,7 @@ class RunningStudio:
     url: str
     sessions: Path
     process: subprocess.Popen[str]
+    link: str = ""  # as it was told, with the token where one is needed
 
     @property
     def port(self) -> int:
@@ -130,9 +131,10 @@ def _start(sessions: Path, *arguments: str) -> RunningStudio:
     )
     assert process.stdout is not None
     for line in process.stdout:
-        found = re.search(r"http://localhost:\d+", line)
+        found = re.search(r"http://[^\s/]+:(\d+)\S*", line)
         if found:
-            return RunningStudio(found.group(), sessions, process)
+            url = f"http://localhost:{found[1]}"
+            return RunningStudio(url, sessions, process, found[0])
     raise AssertionError("the studio ended before it served")
 
 
