@@ -21,7 +21,7 @@ from handstudio import pipeline
 from handstudio.device.addresses import open_source
 from handstudio.device.health import HealthCount
 from handstudio.device.host_clock import now_ns
-from handstudio.device.line import READ_S, Line
+from handstudio.device.line import READ_S, Line, stranger
 from handstudio.device.orders import (
     Ask,
     Connect,
@@ -267,7 +267,7 @@ class Capture:
         return SILENCE_S if setup is None else max(SILENCE_S, 3.0 / setup.rate_hz)
 
     def _refuse(self, line: Line) -> None:
-        self._give_up(_no_glove(self.newest.address, line.received))
+        self._give_up(stranger(line, self.newest.address, INTRODUCTION_S))
 
     def _find_out(self, chunk: bytes, arrival_ns: int, line: Line) -> None:
         """Nothing enters a take or the pipeline before it is known from whom it is."""
@@ -479,23 +479,6 @@ class Capture:
         for done in [recorder for recorder in self._closing if recorder.finished]:
             self._closing.remove(done)
             self._reports.append(done.failure or TakeDone(done.path))
-
-
-def _no_glove(address: str, received: int) -> DeviceError:
-    if received == 0:
-        return DeviceError(
-            "{address} did not say that it is a glove: nothing came within {seconds:.0f} s.",
-            _NO_GLOVE,
-            address=address,
-            seconds=INTRODUCTION_S,
-        )
-    return DeviceError(
-        "{address} did not say that it is a glove: {received} bytes came within {seconds:.0f} s.",
-        _NO_GLOVE,
-        address=address,
-        received=received,
-        seconds=INTRODUCTION_S,
-    )
 
 
 def _take_waits(mine: str, other: str) -> DeviceError:
