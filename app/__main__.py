@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import platform
 import signal
 import threading
 import time
@@ -11,10 +13,16 @@ from types import FrameType
 
 from app import intents
 from app.jobs import Jobs
+from app.journal import Journal
 from app.server import HOST, Server
 from app.studio import State, Studio
+from handstudio import __version__
 from handstudio.device.capture import Capture
-from handstudio.shell import out
+from handstudio.log import log_folder, logging_to
+from handstudio.scrub import Scrubber
+from handstudio.shell import err, out
+
+_log = logging.getLogger("app")  # this module may be called __main__
 
 TICK_S = 1.0 / 60.0
 
@@ -33,6 +41,30 @@ def run(
     Raises:
         HandstudioError: it cannot be served there.
     """
+    scrubber = Scrubber()
+    scrubber.sessions(sessions)
+    scrubber.tokens(() if token is None else (token,))
+    with logging_to(log_folder(), scrubber) as log:
+        if log.problem:
+            err.print(f"No log is kept: {log.folder} cannot be written ({log.problem}).")
+        _log.info("handstudio %s on Python %s, %s", __version__, *_platform())
+        code = _serve(
+            sessions, address, scrubber, port=port, browser=browser, host=host, token=token
+        )
+        _log.info("ended")
+        return code
+
+
+def _serve(
+    sessions: Path,
+    address: str | None,
+    scrubber: Scrubber,
+    *,
+    port: int,
+    browser: bool,
+    host: str,
+    token: str | None,
+) -> int:
     ended = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -45,11 +77,13 @@ def run(
     try:
         studio = Studio(capture, jobs, State(sessions=sessions))
         server = Server(studio, port, host, token)
+        scrubber.tokens(server.door.secrets)
+        _log.info("served %s", "with a token" if server.door.asks else "to this machine")
         _tell(server, sessions)
         if browser:
             webbrowser.open(server.browser_url())
         _begin(studio, address)
-        _loop(studio, server, ended)
+        _loop(studio, server, Journal(scrubber), ended)
         server.close()
     finally:
         capture.stop()
@@ -57,6 +91,10 @@ def run(
         for report in capture.reports():
             out.print(str(getattr(report, "path", report)))
     return 0
+
+
+def _platform() -> tuple[str, str]:
+    return platform.python_version(), platform.platform()
 
 
 def _tell(server: Server, sessions: Path) -> None:
@@ -77,10 +115,12 @@ def _begin(studio: Studio, address: str | None) -> None:
         studio.send(intents.ConnectDevice(address))
 
 
-def _loop(studio: Studio, server: Server, ended: threading.Event) -> None:
+def _loop(studio: Studio, server: Server, journal: Journal, ended: threading.Event) -> None:
     before = time.monotonic()
     while not ended.is_set():
         now = time.monotonic()
-        server.render(studio.tick(now - before))
+        state = studio.tick(now - before)
+        journal.note(state)
+        server.render(state)
         before = now
         ended.wait(max(0.001, TICK_S - (time.monotonic() - now)))

@@ -67,6 +67,11 @@ class Door:
         """Whether visitors need a token."""
         return self._token is not None
 
+    @property
+    def secrets(self) -> tuple[str, ...]:
+        """What must never be written down."""
+        return (self._cookie,) if self._token is None else (self._cookie, self._token)
+
     def ticket(self) -> str:
         """A word that opens the door once, soon, and from this machine only.
 

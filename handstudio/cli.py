@@ -289,6 +289,37 @@ def simulate(
     return 0
 
 
+def diagnostics(*, output: Path | None = None, sessions: Sessions = None) -> int:
+    """Write a file for whoever helps when something does not work; it says nothing of subjects.
+
+    Args:
+        output: The zip to write; in the folder one is in unless given.
+        sessions: Folder of the takes.
+    """
+    from app import diagnostics as what  # noqa: PLC0415 - part of the studio
+
+    target = output or Path(what.zip_name(datetime.now().astimezone()))
+    folder = library.sessions_folder(sessions)
+    takes = library.entries(folder)
+    content = what.make(Newest(), settings={}, sessions=folder, takes=takes)
+    try:
+        with target.open("xb") as file:
+            file.write(content)
+    except FileExistsError as error:
+        raise HandstudioError(
+            "{path} is there already.", "Choose another name: --output FILE.", path=target
+        ) from error
+    except OSError as error:
+        raise HandstudioError(
+            "{path}: cannot be written ({reason}).",
+            "Choose another place: --output FILE.",
+            path=target,
+            reason=error.strerror or error,
+        ) from error
+    out.print(str(target))
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "studio": studio,
     "devices": devices,
@@ -305,6 +336,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "restore": keeping.restore,
     "subjects": keeping.subjects,
     "delete-subject": keeping.delete_subject,
+    "diagnostics": diagnostics,
 }
 
 

@@ -21,6 +21,7 @@ from types import TracebackType
 
 import platformdirs
 
+from handstudio.errors import HandstudioError
 from handstudio.scrub import Scrubber
 
 FOLDER_VARIABLE = "HANDSTUDIO_LOG"
@@ -120,6 +121,11 @@ class _Handler(logging.handlers.RotatingFileHandler):
             self.baseFilename, "a", encoding=self.encoding, errors=self.errors, opener=private
         )
 
+    def close(self) -> None:
+        """Let go of the file; what it still held may be lost."""
+        with contextlib.suppress(OSError):
+            super().close()
+
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - its base's name
         """Go on: the log is the least of what is written."""
 
@@ -165,6 +171,9 @@ def _unexpected_ends() -> Iterator[None]:
     sys.excepthook, threading.excepthook = program, thread
     try:
         yield
+    except HandstudioError as error:
+        log.error("%s: %s", type(error).__name__, error.what)  # noqa: TRY400 - it is expected
+        raise
     except Exception:
         log.critical("the program ends unexpectedly", exc_info=True)
         raise

@@ -40,6 +40,7 @@ class Scrubber:
     def __init__(self, home: Path | None = None) -> None:
         self._lock = threading.Lock()
         self._secrets: dict[str, str] = {}  # each spelling, and what stands for it
+        self._current: frozenset[str] = frozenset()
         self._folders: dict[str, str] = {}
         self._home = _spellings(str(home or Path.home()))
         self._pattern: re.Pattern[str] | None = None
@@ -47,6 +48,13 @@ class Scrubber:
     def names(self, names: Iterable[str]) -> None:
         """Subject codes, names of takes, words of notes: from now on never said."""
         self._keep(names, NAME)
+
+    def now(self, names: Iterable[str]) -> None:
+        """Names that are being typed: not said until there are others in their place."""
+        current = frozenset(names)
+        if current != self._current:
+            with self._lock:
+                self._current, self._pattern = current, None
 
     def tokens(self, tokens: Iterable[str]) -> None:
         """What opens doors."""
@@ -78,12 +86,7 @@ class Scrubber:
         return self.clean(str(value))
 
     def _keep(self, words: Iterable[str], stands_for: str) -> None:
-        new = {
-            spelling: stands_for
-            for word in words
-            if word.strip() and word.strip().lower() not in OUR_WORDS
-            for spelling in _spellings(word.strip())
-        }
+        new = dict.fromkeys(_all_spellings(words), stands_for)
         with self._lock:
             if not new.keys() <= self._secrets.keys():
                 self._secrets |= new
@@ -92,6 +95,7 @@ class Scrubber:
     def _compiled(self) -> re.Pattern[str]:
         tokens = [each for each, kind in self._secrets.items() if kind == TOKEN]
         names = [each for each, kind in self._secrets.items() if kind == NAME]
+        names += _all_spellings(self._current)
         short = [each for each in names if len(each) < _SHORT]
         long = [each for each in names if len(each) >= _SHORT]
         home = [each for each in self._home if len(each) > 1]
@@ -113,6 +117,9 @@ class Scrubber:
 _SHORT = 4
 """A shorter name counts as a word of its own only, or nothing would be left of a text."""
 
+_IN_FILE_NAME = r"(?:_|[^\w\-+.]{1,20})"
+"""What ``_`` in the name of a file may have been when it was typed."""
+
 _STANDS_FOR = {"sessions": SESSIONS, "token": TOKEN, "name": NAME, "word": NAME, "home": "~"}
 
 
@@ -129,15 +136,22 @@ def _beginning_alike(words: list[str]) -> str:
     alike = (a == b for a, b in zip(first, last, strict=False))
     start = first[: next((k for k, same in enumerate(alike) if not same), len(first))]
     rests = {word[len(start) :] for word in words} - {""}
+    pattern = re.escape(start).replace("_", _IN_FILE_NAME)
     if not rests:
-        return re.escape(start)
+        return pattern
     may_end = "?" if start in words else ""
-    return f"{re.escape(start)}(?:{_any_of(rests)}){may_end}"
+    return f"{pattern}(?:{_any_of(rests)}){may_end}"
 
 
 def _small(word: str) -> str:
     """Without capitals, where these are as long: letters of either kind are found alike."""
     return word.lower() if len(word.lower()) == len(word) else word
+
+
+def _all_spellings(words: Iterable[str]) -> set[str]:
+    clear = {word.strip() for word in words}
+    ours = {word for word in clear if not word or word.lower() in OUR_WORDS}
+    return {spelling for word in clear - ours for spelling in _spellings(word)}
 
 
 def _spellings(word: str) -> set[str]:

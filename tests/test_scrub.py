@@ -107,6 +107,12 @@ def test_a_longer_name_leaves_no_rest_of_itself() -> None:
     assert one.clean("Anna-Lena, ANNABEL, anna") == f"{NAME}, {NAME}, {NAME}"
 
 
+def test_what_was_typed_is_known_by_the_name_of_its_file() -> None:
+    one = Scrubber(home=Path("/home/maria"))
+    one.names(["Hans_Müller_2"])
+    assert one.clean("Hans Müller, (2) and Hans_Müller_2") == f"{NAME}) and {NAME}"
+
+
 def test_values_of_json_keep_their_shape(scrubber: Scrubber) -> None:
     value = {"P07": ["山田 太郎", 3, None, 2.5, True], "path": Path("/home/maria/x")}
     assert scrubber.cleaned(value) == {NAME: [NAME, 3, None, 2.5, True], "path": "~/x"}

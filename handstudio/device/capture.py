@@ -62,11 +62,6 @@ INTRODUCTION_S = 4.0  # a device that has not described itself by then is not on
 HEALTH_S = 0.1  # between two times the figures are renewed: they cost as much as a filter step
 HISTORY = 2000  # motions kept for `drain`
 
-_NO_GLOVE = (
-    "Choose another port, switch the glove on, or choose the decoder it needs "
-    "(handstudio/protocol/MAKERS.md)."
-)
-
 
 @dataclass
 class _Wanted:
