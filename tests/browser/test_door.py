@@ -172,7 +172,9 @@ def test_a_foreign_page_cannot_use_the_cookie_of_ours(
     context.close()
 
 
-def test_the_token_stands_nowhere_but_in_the_link(start_studio: Start, tmp_path: Path) -> None:
+def test_the_token_stands_nowhere_but_in_the_link(
+    start_studio: Start, tmp_path: Path, log_folder: Path
+) -> None:
     studio = start_studio("--host", "0.0.0.0")
     token = studio.link.partition("?token=")[2]
     assert get(studio, Host=f"localhost:{studio.port}") == 401
@@ -182,5 +184,20 @@ def test_the_token_stands_nowhere_but_in_the_link(start_studio: Start, tmp_path:
         except OSError:
             continue
         assert token.encode() not in words
-    for file in tmp_path.rglob("*"):
+    assert "served with a token" in (log_folder / "studio.log").read_text("utf-8")
+    for file in [*tmp_path.rglob("*"), *log_folder.iterdir()]:
         assert not file.is_file() or token.encode() not in file.read_bytes()
+
+
+def test_a_token_of_ones_own_comes_by_the_environment_and_is_not_said_again(
+    start_studio: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    token = "a-word-of-our-own-choice"
+    monkeypatch.setenv("HANDSTUDIO_TOKEN", token)
+    studio = start_studio()  # on loopback, and asked for all the same
+    assert studio.link.endswith("/?token=TOKEN")  # its output may be kept in a file
+    assert get(studio, Host=f"localhost:{studio.port}") == 401
+    connection = http.client.HTTPConnection("localhost", studio.port, timeout=10)
+    connection.request("GET", f"/?token={token}")
+    assert connection.getresponse().status == 303
+    connection.close()
