@@ -30,6 +30,7 @@ class Journal:
         now = state.newest
         if now is not was:
             _note_phase(was, now)
+            _note_device(was, now)
             _note_problem(was, now)
             _note_take(was.recorder, now.recorder)
         for message in state.messages:
@@ -53,15 +54,18 @@ def _note_phase(was: Newest, now: Newest) -> None:
     scheme, _, place = now.address.partition(":")
     told = f"{scheme}:{place}" if scheme in ("serial", "tcp") else scheme
     _log.log(level, "device %s: %s, before: %s", told, now.phase.value, was.phase.value)
-    one = now.description
-    if now.phase is Phase.STREAMING and one is not None and was.description != one:
-        form = "it is %s (%s), firmware %s, protocol %d, %d sensors at %d Hz"
-        known = (one.name, one.serial_number, one.firmware, one.protocol, len(one.sensors))
-        _log.info(form, *known, one.rate_hz)
     if now.phase is Phase.LOST:
         form = "so far: %d packets, %d missing, %d damaged, %d restarts"
         health = now.health
         _log.info(form, health.packets, health.missing, health.damaged, health.restarts)
+
+
+def _note_device(was: Newest, now: Newest) -> None:
+    one = now.description
+    if one is not None and one != was.description:
+        form = "it is %s (%s), firmware %s, protocol %d, %d sensors at %d Hz"
+        known = (one.name, one.serial_number, one.firmware, one.protocol, len(one.sensors))
+        _log.info(form, *known, one.rate_hz)
 
 
 def _note_problem(was: Newest, now: Newest) -> None:

@@ -176,8 +176,8 @@ def present_ports() -> list[str]:
 
 
 def rights_of(port: str) -> Rights | None:
-    """Who may open the file of a port; None where files do not decide."""
-    if sys.platform == "win32":
+    """Who may open the file of a port; None where groups are not joined as on Linux."""
+    if not sys.platform.startswith("linux"):
         return None
     import grp  # noqa: PLC0415 - not on Windows
 
@@ -202,6 +202,8 @@ def rights_of(port: str) -> Rights | None:
 
 def program_at(port: str, within_s: float = SEARCH_S) -> str | None:
     """The program that has a port for itself, or open, where the system shows it to us."""
+    if not sys.platform.startswith("linux"):
+        return None
     process = _locker_of(port) or _opener_of(port, time.monotonic() + within_s)
     return None if process is None else _name_of(process)
 

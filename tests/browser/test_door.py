@@ -15,6 +15,8 @@ from playwright.sync_api import Browser, ConsoleMessage, expect
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from app.network import own_addresses
+
 from .conftest import RunningStudio, Start
 
 pytestmark = pytest.mark.browser
@@ -69,9 +71,7 @@ def test_websocket_of_our_own_page(studio: RunningStudio) -> None:
 
 def test_loopback_only(studio: RunningStudio) -> None:
     """Another address of this machine finds nobody."""
-    others = {
-        info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
-    } - {"127.0.0.1", "127.0.1.1"}
+    others = own_addresses()
     if not others:
         pytest.skip("this machine has no address but loopback")
     for address in others:

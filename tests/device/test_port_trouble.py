@@ -115,6 +115,7 @@ def test_the_group_of_a_real_port_is_named_to_somebody_without_rights(mode, join
     assert ("sudo usermod -aG dialout $USER" in said) is joins
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="groups as on Linux")
 def test_rights_are_read_from_the_file(tmp_path, monkeypatch):
     grp = pytest.importorskip("grp")
     place = tmp_path / "port"

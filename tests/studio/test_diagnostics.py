@@ -223,18 +223,21 @@ def test_the_journal_tells_of_devices_and_of_the_size_of_takes(
 ) -> None:
     journal = Journal(Scrubber())
     known = description("right", 3, 100, 1, "Virtual glove")
-    streaming = Newest(Phase.STREAMING, "serial:/dev/ttyACM0", known)
+    asked = Newest(Phase.CONNECTING, "serial:/dev/ttyACM0")
+    streaming = replace(asked, phase=Phase.STREAMING, description=known)
     recording = replace(streaming, recorder=_Recorder(take))
     problem = DeviceError("{port}: gone.", "Plug it in.", port="/dev/ttyACM0")
     lost = replace(streaming, phase=Phase.LOST, problem=problem)
+    day = (Newest(), asked, replace(asked, description=known), streaming, streaming)
     with caplog.at_level(logging.INFO, "app"):
-        for newest in (Newest(), streaming, streaming, recording, recording, lost, lost, streaming):
+        for newest in (*day, recording, recording, lost, lost, streaming):
             journal.note(State(sessions=tmp_path, newest=newest))
     told = [record.getMessage() for record in caplog.records]
     assert told == [
-        "device serial:/dev/ttyACM0: streaming, before: idle",
+        "device serial:/dev/ttyACM0: connecting, before: idle",
         "it is Virtual glove (VG-3), firmware "
         + f"{known.firmware}, protocol 1, 20 sensors at 100 Hz",
+        "device serial:/dev/ttyACM0: streaming, before: connecting",
         "a take begins",
         "device serial:/dev/ttyACM0: lost, before: streaming",
         "so far: 0 packets, 0 missing, 0 damaged, 0 restarts",

@@ -259,6 +259,20 @@ def test_every_name_and_address_of_this_machine_is_ours(closed: House) -> None:
         assert closed.get("/", host=address, to=address, Cookie=cookie).status == 200
 
 
+def test_addresses_of_the_new_kind(house: Callable[..., House]) -> None:
+    try:
+        network.bind_address("::")
+    except HandstudioError:
+        pytest.skip("this machine has no IPv6")
+    one = house(Door(network.hosts("::", "::"), TOKEN), "::")
+    for address in ("::1", *network.own_addresses(socket.AF_INET6)):
+        host = network.as_host(address)
+        answer = one.get(f"/?token={TOKEN}", host=host, to=address)
+        assert answer.status == 303
+        assert one.get("/", host=host, to=address, Cookie=answer.cookie).status == 200
+        assert one.get("/", host="[2001:db8::9]", to=address, Cookie=answer.cookie).status == 403
+
+
 @pytest.mark.parametrize("host", ["evil.example", "192.0.2.77", "127.0.0.2", "localhost.evil", ""])
 def test_any_other_name_is_foreign_even_with_cookie_and_token(closed: House, host: str) -> None:
     cookie = closed.get(f"/?token={TOKEN}").cookie
