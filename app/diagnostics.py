@@ -21,18 +21,23 @@ from serial.tools import list_ports
 
 from handstudio import __version__
 from handstudio.device.orders import Newest
-from handstudio.errors import HandstudioError
 from handstudio.log import log_files, log_folder
+from handstudio.recording.bin import list_bin
 from handstudio.recording.library import Entry
-from handstudio.recording.notes import load_notes
+from handstudio.recording.notes import Notes
+from handstudio.recording.subjects import list_subjects
 from handstudio.scrub import Scrubber
 
 LEFT_OUT = "[left out]"
 
 _PRIVATE = re.compile(
-    r"subject|take|name|note|label|word|path|folder|file|session|token|search", re.IGNORECASE
+    r"subject|take|visit|name|note|label|word|path|folder|file|session|token|search",
+    re.IGNORECASE,
 )
-"""Settings called so are left out whole, whatever they hold."""
+"""Settings called so are left out, whatever they hold but yes and no."""
+
+_DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
+"""The name of most visits: a date is in every line of a log."""
 
 _README = """\
 What helps to find out why handstudio does not do what it should.
@@ -91,12 +96,13 @@ def make(
     if recorder is not None:
         scrubber.names((recorder.header.subject, recorder.header.name))
     learn_names(scrubber, takes)
+    scrubber.names(_names_elsewhere(sessions))
     return bundle(collect(newest, settings, sessions, log_folder()), scrubber)
 
 
 def bundle(facts: Facts, scrubber: Scrubber) -> bytes:
     """A zip of the facts, without what is private."""
-    kept = {key: LEFT_OUT if _PRIVATE.search(key) else v for key, v in facts.settings.items()}
+    kept = _without_private(facts.settings)
     members = {
         "README.txt": _README,
         "versions.json": _json(facts.versions, scrubber),
@@ -135,18 +141,14 @@ def collect(
     )
 
 
-def learn_names(scrubber: Scrubber, takes: Iterable[Entry], with_notes: bool = True) -> None:
+def learn_names(scrubber: Scrubber, takes: Iterable[Entry]) -> None:
     """Let a scrubber know what may not be said: names of takes and subjects, words of notes."""
     names: set[str] = set()
     for entry in takes:
-        path = entry.path
-        names |= {path.name.partition(".mcap")[0], path.parent.name, path.parent.parent.name}
+        names |= {entry.subject, entry.visit, entry.name, *_words_of(entry.notes)}
         if entry.take is not None:
-            header = entry.take.header
-            names |= {header.subject, header.name}
-        if with_notes:
-            names |= _words_of_notes(path)
-    scrubber.names(names)
+            names |= {entry.take.header.subject, entry.take.header.name}
+    scrubber.names(name for name in names if not _DAY.fullmatch(name))
 
 
 def zip_name(now: datetime) -> str:
@@ -154,12 +156,30 @@ def zip_name(now: datetime) -> str:
     return f"handstudio-diagnostics-{now:%Y%m%d-%H%M%S}.zip"
 
 
-def _words_of_notes(path: Path) -> set[str]:
-    try:
-        notes = load_notes(path)
-    except HandstudioError:
-        return set()
-    return {notes.text, *(label.label for label in notes.labels)}
+def _words_of(notes: Notes) -> set[str]:
+    labels, marks = (label.label for label in notes.labels), (mark.text for mark in notes.marks)
+    return {notes.text, *labels, *marks}
+
+
+def _names_elsewhere(sessions: Path) -> set[str]:
+    """Subjects without takes, what is noted of subjects, and what lies in the bin."""
+    names: set[str] = set()
+    for known in list_subjects(sessions):
+        names |= {known.subject.code, known.subject.note, *known.visits}
+    for binned in list_bin(sessions):
+        names |= {binned.subject, binned.visit, binned.name}
+    return {name for name in names if not _DAY.fullmatch(name)}
+
+
+def _without_private(settings: Mapping[str, Any]) -> dict[str, Any]:
+    kept: dict[str, Any] = {}
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            kept[name] = _without_private(value)
+        else:
+            private = _PRIVATE.search(name) is not None and not isinstance(value, bool)
+            kept[name] = LEFT_OUT if private else value
+    return kept
 
 
 def _json(value: object, scrubber: Scrubber) -> str:

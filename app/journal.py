@@ -41,7 +41,7 @@ class Journal:
         """Names are private before anything that may hold them is logged."""
         self._scrubber.now((state.subject, state.take_name))
         if before is None or state.takes is not before.takes:
-            learn_names(self._scrubber, state.takes, with_notes=False)
+            learn_names(self._scrubber, state.takes)
         recorder = state.newest.recorder
         if recorder is not None and (before is None or recorder is not before.newest.recorder):
             self._scrubber.names((recorder.header.subject, recorder.header.name))

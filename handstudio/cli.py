@@ -32,6 +32,7 @@ from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
+from handstudio.settings import load_settings, settings_path
 from handstudio.setup import HandModel, filter_named
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
@@ -301,7 +302,14 @@ def diagnostics(*, output: Path | None = None, sessions: Sessions = None) -> int
     target = output or Path(what.zip_name(datetime.now().astimezone()))
     folder = library.sessions_folder(sessions)
     takes = library.entries(folder)
-    content = what.make(Newest(), settings={}, sessions=folder, takes=takes)
+    remembered = load_settings(settings_path()).settings
+    content = what.make(
+        Newest(),
+        settings=msgspec.to_builtins(remembered),
+        sessions=folder,
+        takes=takes,
+        names=(remembered.subject, remembered.take_name, remembered.visit),
+    )
     try:
         with target.open("xb") as file:
             file.write(content)

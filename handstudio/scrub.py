@@ -12,7 +12,7 @@ import threading
 import unicodedata
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from urllib.parse import quote
 
 NAME = "[name]"
@@ -34,45 +34,64 @@ _REST_OF_PATH = r"(?:(?:\\\\|[/\\])(?:(?!: )[^\n'\"])*|(?![\w.-]))"
 class Scrubber:
     """Knows what is private, and takes it out of texts; for any thread.
 
-    What was private once remains so: a log speaks of what was.
+    What was private once remains so: a log speaks of what was. A pattern of thousands of names
+    takes long to make, so those that came since are kept in a small one, which is asked first.
     """
 
     def __init__(self, home: Path | None = None) -> None:
         self._lock = threading.Lock()
-        self._secrets: dict[str, str] = {}  # each spelling, and what stands for it
+        self._seen: set[str] = set()  # words whose spellings are known
+        self._names: set[str] = set()  # each spelling of each
+        self._recent: set[str] = set()  # those that are not in the large pattern, or would cut it
         self._current: frozenset[str] = frozenset()
-        self._folders: dict[str, str] = {}
-        self._home = _spellings(str(home or Path.home()))
-        self._pattern: re.Pattern[str] | None = None
+        self._tokens: set[str] = set()
+        self._folders: set[str] = set()
+        self._home = {each for each in _spellings(str(home or Path.home())) if len(each) > 1}
+        self._small: re.Pattern[str] | None = None
+        self._large: re.Pattern[str] | None = None
 
     def names(self, names: Iterable[str]) -> None:
         """Subject codes, names of takes, words of notes: from now on never said."""
-        self._keep(names, NAME)
+        fresh = {name.strip() for name in names} - self._seen
+        if not fresh:
+            return
+        new = _all_spellings(fresh)
+        with self._lock:
+            self._seen |= fresh
+            self._recent |= new | self._longer_than(new)
+            self._names |= new
+            self._small = None
+            if len(self._recent) > _FEW:
+                self._recent, self._large = set(), None
 
     def now(self, names: Iterable[str]) -> None:
         """Names that are being typed: not said until there are others in their place."""
         current = frozenset(names)
         if current != self._current:
             with self._lock:
-                self._current, self._pattern = current, None
+                self._current, self._small = current, None
 
     def tokens(self, tokens: Iterable[str]) -> None:
         """What opens doors."""
-        self._keep(tokens, TOKEN)
+        with self._lock:
+            self._tokens |= _all_spellings(tokens)
+            self._small = None
 
     def sessions(self, folder: Path) -> None:
         """Where takes live: neither the folder nor anything below it is said."""
         with self._lock:
             for path in {str(folder), str(folder.absolute())} - {"/", ".", ""}:
-                self._folders |= dict.fromkeys(_spellings(path), SESSIONS)
-            self._pattern = None
+                self._folders |= _spellings(path)
+            self._small = None
 
     def clean(self, text: str) -> str:
         """The text without what is private."""
         with self._lock:
-            self._pattern = self._pattern or self._compiled()
-            pattern = self._pattern
-        text = pattern.sub(lambda found: _STANDS_FOR[found.lastgroup or "name"], text)
+            self._small = self._small or self._compiled_small()
+            self._large = self._large or _pattern([*_of_names(self._names)])
+            patterns = self._small, self._large
+        for pattern in patterns:
+            text = pattern.sub(lambda found: _STANDS_FOR[found.lastgroup or "name"], text)
         return _TAKE_FILE.sub(TAKE, text)
 
     def cleaned(self, value: Any) -> Any:
@@ -85,38 +104,47 @@ class Scrubber:
             return value
         return self.clean(str(value))
 
-    def _keep(self, words: Iterable[str], stands_for: str) -> None:
-        new = dict.fromkeys(_all_spellings(words), stands_for)
-        with self._lock:
-            if not new.keys() <= self._secrets.keys():
-                self._secrets |= new
-                self._pattern = None
+    def _longer_than(self, new: set[str]) -> set[str]:
+        """Names that hold one of the new: who takes out these first leaves a rest of those."""
+        low = {word.lower() for word in new}
+        return {old for old in self._names if any(word in old.lower() for word in low)}
 
-    def _compiled(self) -> re.Pattern[str]:
-        tokens = [each for each, kind in self._secrets.items() if kind == TOKEN]
-        names = [each for each, kind in self._secrets.items() if kind == NAME]
-        names += _all_spellings(self._current)
-        short = [each for each in names if len(each) < _SHORT]
-        long = [each for each in names if len(each) >= _SHORT]
-        home = [each for each in self._home if len(each) > 1]
-        parts = [
-            ("sessions", list(self._folders), "", _REST_OF_PATH),
-            ("token", tokens, "", ""),
-            ("name", long, "", ""),
-            ("word", short, r"(?<![^\W_])", r"(?![^\W_])"),
-            ("home", home, "", r"(?![\w-])"),
-        ]
-        given = [
-            f"(?P<{kind}>{before}(?:{_any_of(words)}){after})"
-            for kind, words, before, after in parts
-            if words
-        ]
-        return re.compile("|".join(given) or r"(?!)", re.IGNORECASE)
+    def _compiled_small(self) -> re.Pattern[str]:
+        current = _all_spellings(self._current)
+        names = self._recent | current | self._longer_than(current)
+        return _pattern(
+            [
+                ("sessions", self._folders, "", _REST_OF_PATH),
+                ("token", self._tokens, "", ""),
+                *_of_names(names),
+                ("home", self._home, "", r"(?![\w-])"),
+            ]
+        )
+
+
+_Part: TypeAlias = tuple[str, Iterable[str], str, str]
+"""What it is, its words, and what has to be before and behind them."""
+
+_FEW = 300
+
+
+def _of_names(names: Iterable[str]) -> list[_Part]:
+    """Short names count as words of their own only, or nothing would be left of a text."""
+    short = [each for each in names if len(each) < _SHORT]
+    long = [each for each in names if len(each) >= _SHORT]
+    return [("name", long, "", ""), ("word", short, r"(?<![^\W_])", r"(?![^\W_])")]
+
+
+def _pattern(parts: Iterable[_Part]) -> re.Pattern[str]:
+    given = [
+        f"(?P<{kind}>{before}(?:{_any_of(words)}){after})"
+        for kind, words, before, after in parts
+        if words
+    ]
+    return re.compile("|".join(given) or r"(?!)", re.IGNORECASE)
 
 
 _SHORT = 4
-"""A shorter name counts as a word of its own only, or nothing would be left of a text."""
-
 _IN_FILE_NAME = r"(?:_|[^\w\-+.]{1,20})"
 """What ``_`` in the name of a file may have been when it was typed."""
 

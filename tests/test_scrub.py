@@ -113,6 +113,18 @@ def test_what_was_typed_is_known_by_the_name_of_its_file() -> None:
     assert one.clean("Hans Müller, (2) and Hans_Müller_2") == f"{NAME}) and {NAME}"
 
 
+def test_names_that_come_later_leave_no_rest_of_earlier_ones() -> None:
+    one = Scrubber(home=Path("/home/maria"))
+    one.names([*(f"subject {number} of the study" for number in range(400)), "Anna-Lena"])
+    assert one.clean("Anna-Lena") == NAME
+    one.names(["Anna"])
+    assert one.clean("Anna-Lena, Anna, subject 7 of the study") == f"{NAME}, {NAME}, {NAME}"
+    one.names(["Anna-Lena-Maria"])
+    one.now(["subject"])
+    said = one.clean("Anna-Lena-Maria, subject 12 of the study, subject")
+    assert said == f"{NAME}, {NAME}, {NAME}"
+
+
 def test_values_of_json_keep_their_shape(scrubber: Scrubber) -> None:
     value = {"P07": ["山田 太郎", 3, None, 2.5, True], "path": Path("/home/maria/x")}
     assert scrubber.cleaned(value) == {NAME: [NAME, 3, None, 2.5, True], "path": "~/x"}

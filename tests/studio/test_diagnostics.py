@@ -25,8 +25,10 @@ from handstudio.errors import DeviceError, TakeError
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.log import FILE, logging_to
 from handstudio.recording import library
+from handstudio.recording.bin import move_to_bin
 from handstudio.recording.notes import Label, Notes, save_notes
 from handstudio.recording.simulated import simulate
+from handstudio.recording.subjects import Subject, create_subject
 from handstudio.recording.take import Take
 from handstudio.recording.writer import TakeWriter
 from handstudio.scrub import Scrubber
@@ -179,10 +181,12 @@ def test_settings_with_private_names_are_left_out_whatever_they_hold() -> None:
         "notes": ["y"],
         "sessions_folder": "z",
         "port": 8765,
+        "shown": {"labels": True, "names": "x"},
     }
     facts = Facts(datetime(2026, 1, 31, tzinfo=UTC), settings=settings)
     told = json.loads(members(bundle(facts, Scrubber()))["settings.json"])
     assert told.pop("port") == 8765
+    assert told.pop("shown") == {"labels": True, "names": diagnostics.LEFT_OUT}
     assert set(told.values()) == {diagnostics.LEFT_OUT}
 
 
@@ -204,6 +208,19 @@ def test_notes_that_cannot_be_read_are_no_obstacle(
     for file in recorded.parent.glob("*.notes.json*"):
         file.write_text("{")
     assert make(Newest(), settings={}, sessions=sessions, takes=library.entries(sessions))
+
+
+def test_subjects_without_takes_and_takes_in_the_bin_are_not_named(
+    sessions: Path, recorded: Path, log: Path
+) -> None:
+    create_subject(sessions, Subject("Ottokar", note="limps"))
+    move_to_bin(sessions, recorded, datetime(2026, 2, 1, tzinfo=UTC))
+    log.mkdir()
+    (log / FILE).write_text(f"INFO Ottokar limps; {SUBJECT}: {NAME}\n", "utf-8")
+    content = make(Newest(), settings={}, sessions=sessions, takes=library.entries(sessions))
+    said = members(content)[f"log/{FILE}"]
+    assert "INFO" in said
+    assert not any(word in said for word in ("Ottokar", "limps", "Zoë", "übung"))
 
 
 # --- the journal ----------------------------------------------------------------------------------
