@@ -10,6 +10,7 @@ from typing import TypeAlias
 from handstudio.device.health import HealthView
 from handstudio.device.recorder import Recorder
 from handstudio.errors import HandstudioError
+from handstudio.health.findings import Finding
 from handstudio.pipeline import Motion
 from handstudio.protocol.packets import Description, Reply
 from handstudio.setup import HandModel, Setup
@@ -81,6 +82,7 @@ class Newest:
     setup: Setup | None = None
     motion: Motion | None = None  # one instant
     health: HealthView = HealthView()
+    findings: tuple[Finding, ...] = ()  # what is wrong now, the worse first
     problem: HandstudioError | None = None
     recorder: Recorder | None = None
     last_reply: Reply | None = None

@@ -41,6 +41,11 @@ class ClockEstimate:
         device, difference = np.array(self._bins, dtype=float).T
         return float(np.polyfit(device - device[0], difference - difference[0], 1)[0] * 1e6)
 
+    @property
+    def seconds(self) -> int:
+        """How many seconds of arrivals the estimate rests on."""
+        return len(self._bins)
+
     def offset_ns(self) -> int | None:
         """Host minus device time now, least delay included; None before the first arrival."""
         if not self._bins:
