@@ -23,6 +23,7 @@ from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.health.record import TakeHealth
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
@@ -31,6 +32,7 @@ from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
+from handstudio.recording.take_health import health_of_take
 from handstudio.setup import HandModel, filter_named
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
@@ -122,14 +124,16 @@ def record(
     return _tell_take(open_take(path), json)
 
 
-def info(take: TakeFile, *, json: Json = False) -> int:
-    """Say what a take holds.
+def info(take: TakeFile, *, health: bool = False, json: Json = False) -> int:
+    """Say what a take holds, and how its stream and sensors did.
 
     Args:
         take: The take.
+        health: Compute how stream and sensors did where it was not kept (recovered or older takes).
         json: Print JSON for a program instead of words.
     """
-    return _tell_take(open_take(take), json)
+    opened = open_take(take)
+    return _tell_take(opened, json, health_of_take(opened) if health else None)
 
 
 def process(
@@ -385,17 +389,48 @@ def _raise_what_failed(capture: Capture) -> None:
         raise capture.newest.problem
 
 
-def _tell_take(take: Take, json: bool) -> int:
+def _tell_take(take: Take, json: bool, health: TakeHealth | None = None) -> int:
     header, summary = take.header, take.summary
+    if health is None and summary is not None:
+        health = summary.health
     if json:
-        print_json({"path": str(take.path), "header": header, "summary": summary})
+        told = {"path": str(take.path), "header": header, "summary": summary, "health": health}
+        print_json(told)
         return 0
     rows = [[key, value] for key, value in _facts(header).items()]
     if summary is not None:
         lost = f"{summary.missing} of {summary.packets + summary.missing} instants"
         rows += [["duration", f"{summary.duration_s:.2f} s"], ["lost", lost]]
+    if health is not None:
+        rows += [[key, value] for key, value in _health_facts(health, header).items()]
     print_table(str(take.path), ["", ""], rows)
     return 0
+
+
+def _health_facts(health: TakeHealth, header: Header) -> dict[str, str]:
+    facts = {}
+    if health.measured_rate_hz is not None:
+        facts["measured rate"] = f"{health.measured_rate_hz:.2f} Hz"
+    if health.jitter_p95_ms is not None:
+        facts["jitter"] = f"95 % of the chunks within {health.jitter_p95_ms:.1f} ms"
+    if health.latency is not None:
+        facts["latency"] = (
+            f"50 % {health.latency.p50_ms:.1f} ms, 99 % {health.latency.p99_ms:.1f} ms, "
+            f"longest {health.latency.max_ms:.1f} ms"
+        )
+    facts["damaged, dropped by device, restarts"] = (
+        f"{health.damaged}, {health.dropped_by_device}, {health.restarts}"
+    )
+    names = header.setup.layout.names
+    for trouble in health.troubles:
+        where = ", ".join(names[sensor] for sensor in trouble.sensors)
+        facts[trouble.kind] = (
+            f"{where + ': ' if where else ''}{trouble.times} times, {trouble.seconds:.1f} s, "
+            f"worst {trouble.worst:.3g} {trouble.unit}"
+        )
+    if health.episodes_not_kept:
+        facts["not listed"] = f"{health.episodes_not_kept} more of these"
+    return facts
 
 
 def _facts(header: Header) -> dict[str, str]:

@@ -35,7 +35,9 @@ class Account:
         self._on_s = {kind: np.zeros(sensors) for kind in (Kind.STUCK, Kind.NOISY, Kind.MAGNETIC)}
         self._first_us: int | None = None
 
-    def note(self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int) -> None:
+    def note(
+        self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int | None
+    ) -> None:
         """Count a chunk."""
         self.figures.note(packets, events, arrival_ns)
 

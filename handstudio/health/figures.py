@@ -12,7 +12,7 @@ from handstudio.arrays import Array
 from handstudio.health.clock import ClockEstimate
 from handstudio.health.distribution import Distribution
 from handstudio.health.findings import Kind
-from handstudio.health.limits import DRIFT_BINS, RECENT_WINDOWS
+from handstudio.health.limits import RECENT_WINDOWS
 from handstudio.health.measures import Measures
 from handstudio.protocol.packets import Corruption, Health, Packet, Restart, Temperature
 from handstudio.samples import Event, Gap, ImuSamples, Why
@@ -40,7 +40,9 @@ class Figures:
         self._recent: deque[tuple[int, ...]] = deque(maxlen=RECENT_WINDOWS)
         self._marked = (0, 0)  # damaged and dropped when the last window ended
 
-    def note(self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int) -> None:
+    def note(
+        self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int | None
+    ) -> None:
         """Count a chunk."""
         for packet in packets:
             match packet:
@@ -66,7 +68,9 @@ class Figures:
                 case Gap(missing=missing):
                     self.missing += missing
         if newest is not None:
-            self._note_newest(newest, self.instants - before, arrival_ns)
+            self._note_newest(newest)
+            if arrival_ns is not None:
+                self._note_arrival(newest, self.instants - before, arrival_ns)
 
     def close_window(self, measures: Measures, nominal_hz: float) -> dict[Kind, float]:
         """Add a window; what the recent ones say of the stream, unit as `Kind` says."""
@@ -80,7 +84,7 @@ class Figures:
         # of a second at least: the first lost instant of a stream is not half of it
         percent = 100.0 / max(instants + missing, nominal_hz)
         nan = float("nan")
-        drift = self.clock.drift_ppm if self.clock.seconds >= DRIFT_BINS else None
+        drift = self.clock.sure_drift_ppm
         jitter = self.jitter.recent_quantile(0.95)
         late = self.latency.recent_quantile(0.99)
         self.jitter.turn()
@@ -119,7 +123,12 @@ class Figures:
             return None
         return self.celsius - self.celsius_first
 
-    def _note_newest(self, newest: ImuSamples, instants: int, arrival_ns: int) -> None:
+    def _note_newest(self, newest: ImuSamples) -> None:
+        answering = newest.valid[-1]
+        every = bool(answering.all())
+        self.silent = () if every else tuple(int(i) for i in np.flatnonzero(~answering))
+
+    def _note_arrival(self, newest: ImuSamples, instants: int, arrival_ns: int) -> None:
         clock_us = int(newest.time_us[-1])
         self._arrivals.append((arrival_ns, instants))
         if self._arrivals[0][0] < arrival_ns - 2 * _SPAN_NS:
@@ -127,8 +136,6 @@ class Figures:
         self.clock.observe(clock_us, arrival_ns)
         self.delay_ms = self.clock.delay_ms(clock_us, arrival_ns)
         self.jitter.add(self.delay_ms)
-        answering = newest.valid[-1]
-        self.silent = () if answering.all() else tuple(int(i) for i in np.flatnonzero(~answering))
 
     def _note_restart(self) -> None:
         self.restarts += 1

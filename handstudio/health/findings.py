@@ -58,6 +58,18 @@ PER_SENSOR = frozenset(
 )
 """The others are of the stream as a whole and name no sensors."""
 
+UNITS: dict[Kind, str] = {
+    **dict.fromkeys((Kind.LOSS, Kind.DAMAGED, Kind.DROPPED, Kind.RATE), "%"),
+    Kind.RESTARTED: "times",
+    **dict.fromkeys((Kind.JITTER, Kind.LATE), "ms"),
+    Kind.DRIFT: "ppm",
+    **dict.fromkeys((Kind.SILENT, Kind.SATURATED, Kind.MAGNETIC), "%"),
+    Kind.STUCK: "s",
+    Kind.NOISY: "times the usual noise",
+    Kind.WARMED: "°C",
+}
+"""What the value of each kind is in."""
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from handstudio.health.findings import Level
+from handstudio.health.findings import UNITS, Level
 
 
 class Latency(msgspec.Struct, frozen=True):
@@ -57,6 +57,28 @@ class Episode(msgspec.Struct, frozen=True):
     worst: float
 
 
+class Trouble(msgspec.Struct, frozen=True):
+    """All kept episodes of one kind together.
+
+    Attributes:
+        kind: Value of a `Kind`.
+        level: The worst.
+        unit: Of ``worst``; empty where the kind is unknown to this version.
+        worst: Worst value.
+        seconds: How long it lasted, all episodes together.
+        times: How many episodes.
+        sensors: Indices in the layout, all that were concerned.
+    """
+
+    kind: str
+    level: Level
+    unit: str
+    worst: float
+    seconds: float
+    times: int
+    sensors: tuple[int, ...]
+
+
 class TakeHealth(msgspec.Struct, frozen=True):
     """Figures over a take.
 
@@ -95,3 +117,27 @@ class TakeHealth(msgspec.Struct, frozen=True):
         """Share of the instants that were lost."""
         whole = self.instants + self.missing
         return 100.0 * self.missing / whole if whole else 0.0
+
+    @property
+    def troubles(self) -> tuple[Trouble, ...]:
+        """What was wrong, one entry a kind, those to act on first."""
+        kinds: dict[str, list[Episode]] = {}
+        for episode in self.episodes:
+            kinds.setdefault(episode.kind, []).append(episode)
+        every = [_trouble(kind, episodes) for kind, episodes in kinds.items()]
+        return tuple(sorted(every, key=lambda one: (one.level != "act", one.kind)))
+
+
+_UNITS = {kind.value: unit for kind, unit in UNITS.items()}
+
+
+def _trouble(kind: str, episodes: list[Episode]) -> Trouble:
+    return Trouble(
+        kind=kind,
+        level="act" if any(one.level == "act" for one in episodes) else "note",
+        unit=_UNITS.get(kind, ""),
+        worst=max(one.worst for one in episodes),
+        seconds=round(sum(one.end_s - one.start_s for one in episodes), 3),
+        times=len(episodes),
+        sensors=tuple(sorted({sensor for one in episodes for sensor in one.sensors})),
+    )

@@ -39,8 +39,10 @@ class Watch:
         self._windows = Windows(self._sensors, setup.rate_hz)
         self._live = Account(self._sensors, setup.rate_hz, self._live.figures)
 
-    def note(self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int) -> None:
-        """Count and keep a chunk that arrived at host time ``arrival_ns``."""
+    def note(
+        self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int | None
+    ) -> None:
+        """Count and keep a chunk that arrived at host time ``arrival_ns``, None: nobody knows."""
         packets = list(packets)
         self._live.note(packets, events, arrival_ns)
         if self._take is not None:

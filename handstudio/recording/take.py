@@ -100,11 +100,11 @@ class Take:
         for arrival_ns, chunk in self.chunks():
             yield stream.feed(chunk, arrival_ns)[1]
 
-    def decoded(self) -> Iterator[tuple[int, list[Packet], list[Event]]]:
-        """Time of arrival [ns UTC], packets and events of every chunk; an import has no packets."""
+    def decoded(self) -> Iterator[tuple[int | None, list[Packet], list[Event]]]:
+        """Arrival [ns UTC], packets and events of every chunk; an import has events alone."""
         if self.header.kind == "samples":
-            for log_time_ns, data in self.chunks():
-                yield log_time_ns, [], [decode_samples(data)]
+            for _, data in self.chunks():
+                yield None, [], [decode_samples(data)]
             return
         stream = self._stream(from_start=False)
         for arrival_ns, chunk in self.chunks():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import msgspec
-
 from handstudio.health.record import TakeHealth
 from handstudio.health.watch import Watch
 from handstudio.recording.take import Take
@@ -35,6 +33,4 @@ def recomputed_health(take: Take) -> TakeHealth:
         watch.note(packets, events, arrival_ns)
     health = watch.end_take()
     assert health is not None  # a take was begun
-    if take.header.kind == "wire":
-        return health
-    return msgspec.structs.replace(health, jitter_p95_ms=None, drift_ppm=None)
+    return health
