@@ -9,6 +9,8 @@ from handstudio.arrays import Array
 from handstudio.health.findings import PER_SENSOR, Finding, Kind
 from handstudio.health.limits import KEEP, LIMITS, OFF_S
 
+_A_MOMENT_S = 1e-3  # sums of windows end a rounding before what they should be
+
 
 class Latch:
     """One kind of finding, of every sensor or, with one place, of the stream."""
@@ -33,7 +35,7 @@ class Latch:
         self._run = np.where(bad, self._run + 1, np.where(known, 0, self._run))
         self._well_s = np.where(bad, 0.0, self._well_s + np.where(known, span_s, 0.0))
         rise = bad & (self._run >= LIMITS[self.kind].hold)
-        self.on = (self.on | rise) & (self._well_s < OFF_S)
+        self.on = (self.on | rise) & (self._well_s < OFF_S - _A_MOMENT_S)
         self.shown = np.where(bad[0], value, self.shown)
         if (bad[0] & self.on[0]).any():
             self.bad_until_s = end_s

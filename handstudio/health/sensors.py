@@ -98,8 +98,12 @@ def _ratio(density: Array, still: Array, typical: float) -> Array:
 
 
 def _still(measures: Measures) -> Array:
-    """Who does not move, its own noise apart; False where that is unknown."""
+    """Who does not move, its own noise apart; False where that is unknown.
+
+    Not a single count of noise: what does not change tells nothing of rest.
+    """
     gyr = limits.STILL_GYR + limits.STILL_NOISE * measures.noise_gyr
     acc = limits.STILL_ACC + limits.STILL_NOISE * measures.noise_acc
-    still: Array = (measures.spread_gyr <= gyr) & (measures.spread_acc <= acc)
+    alive = (measures.spread_gyr > 0.0) & (measures.spread_acc > 0.0)
+    still: Array = alive & (measures.spread_gyr <= gyr) & (measures.spread_acc <= acc)
     return still

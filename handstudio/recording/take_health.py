@@ -25,6 +25,7 @@ def recomputed_health(take: Take) -> TakeHealth:
 
     Raises:
         TakeError: the file is damaged.
+        SetupError: what the decoder knew at the first byte cannot be read by this version.
     """
     watch = Watch()
     watch.begin(take.header.setup)
