@@ -11,6 +11,7 @@ from handstudio.health.limits import RECENT_WINDOWS
 
 _LOWEST_MS = 0.01
 _PER_DECADE = 50  # a bin is 4.7 % wide: no more than that is a percentile too high
+_SURE = 0.999  # durations beyond a quantile; 1 but for rounding
 _BINS = 6 * _PER_DECADE + 2  # up to 10 s; what is below or above goes to the first and last
 
 
@@ -54,6 +55,13 @@ class Distribution:
     def recent_quantile(self, share: float) -> float | None:
         """The same of the recent ones."""
         return _quantile(self._recent.sum(axis=0), share, max(self._maxima))
+
+    def sure_quantile(self, share: float) -> float | None:
+        """The same, None of so few that it is the longest: one slow moment is not a habit."""
+        counts = self._recent.sum(axis=0)
+        if counts.sum() * (1.0 - share) < _SURE:
+            return None
+        return _quantile(counts, share, max(self._maxima))
 
     def quantiles(self) -> Quantiles | None:
         """Of all."""

@@ -85,8 +85,8 @@ class Figures:
         percent = 100.0 / max(instants + missing, nominal_hz)
         nan = float("nan")
         drift = self.clock.sure_drift_ppm
-        jitter = self.jitter.recent_quantile(0.95)
-        late = self.latency.recent_quantile(0.99)
+        jitter = self.jitter.sure_quantile(0.95)
+        late = self.latency.sure_quantile(0.99)
         self.jitter.turn()
         self.latency.turn()
         return {

@@ -108,8 +108,22 @@ def test_a_recording_is_a_take_of_the_library_and_of_that_length(handstudio, rec
 def test_a_take_is_described_for_persons(here, recorded):
     said = here("info", recorded)
     assert said.code == 0
-    for fact in ("P07", "171 mm", "100 Hz", "VG-7", "SN17"):
+    for fact in ("P07", "171 mm", "100 Hz", "VG-7", "SN17", "100.00 Hz", "latency", "jitter"):
         assert fact in said.out
+
+
+def test_how_a_take_did_is_told_and_computed_where_it_was_not_kept(here, recorded, tmp_path):
+    kept = here("info", recorded, "--json").json["health"]
+    assert kept["latency"]["p99_ms"] > 0.0
+    assert len(kept["sensors"]) == 20
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(recorded.read_bytes()[:-500])
+    back = here("recover", torn, "--json").json["path"]
+    assert here("info", back, "--json").json["health"] is None
+    computed = here("info", back, "--health", "--json").json["health"]
+    assert computed["latency"] is None
+    assert computed["measured_rate_hz"] == kept["measured_rate_hz"]
+    assert "restarts" in here("info", back, "--health").out
 
 
 def test_processing_writes_the_csv_that_exporting_writes(handstudio, take, tmp_path):
