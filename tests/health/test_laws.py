@@ -28,7 +28,7 @@ from handstudio.protocol.packets import (
     Restart,
     Temperature,
 )
-from handstudio.samples import FULL_SCALE, from_packets
+from handstudio.samples import FULL_SCALE, Gap, Why, from_packets
 
 from .conftest import DEVICE_US, Glove, glove
 
@@ -147,6 +147,16 @@ def test_no_instant_is_lost_or_counted_twice_between_windows():
     assert (np.diff(starts) > 0).all()
 
 
+def test_time_goes_on_over_a_restart_by_as_long_as_the_device_was_away():
+    one = glove(seconds=3.0)
+    before, after = (from_packets(one.packets()[:150], one.ranges)[0] for _ in range(2))
+    windows = Windows(20, 100.0)
+    found = [w for e in (before, Gap(Why.RESTART, 0, 4_000_000), after) for w in windows.add(e)]
+    gap = [window for window in found if window.restarts]
+    assert len(gap) == 1
+    assert gap[0].start_us == int(before.time_us[-1]) + 4_000_000
+
+
 def test_noise_is_not_taken_from_over_a_gap():
     """The step between two attitudes is no noise."""
     one = glove(seconds=3.0)
@@ -177,6 +187,19 @@ def test_episodes_are_bounded_and_the_rest_is_counted():
     assert (len(kept), beyond) == (EPISODES, 8)
     assert kept[1].start_s == 10.0
     assert kept[1].end_s == 10.5
+
+
+def test_a_value_that_wavers_about_its_limit_is_one_finding_from_then_on():
+    latch = Latch(Kind.JITTER, 1)  # 50 ms, after two windows
+    on = []
+    for k, value in enumerate([51.0, 49.0, 51.0, 52.0, *[45.0] * 8, *[35.0] * 4, 51.0]):
+        latch.update(np.array([value]), 0.5 * k, 0.5 * k + 0.49, 0.5)
+        on.append(bool(latch.on[0, 0]))
+    assert on == [False] * 3 + [True] * 12 + [False] * 2
+    latch.update(np.array([60.0]), 9.0, 9.49, 0.5)
+    for k in range(20):  # what says nothing is not well
+        latch.update(np.full(1, np.nan), 10.0 + k, 10.49 + k, 0.5)
+    assert latch.on[0, 0]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
