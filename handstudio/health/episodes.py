@@ -59,10 +59,9 @@ class Episodes:
 
 
 def _episode(kind: Kind, one: _Open) -> Episode:
-    level = "act" if one.act else "note"
     return Episode(
         kind.value,
-        "act" if level == "act" else "note",
+        "act" if one.act else "note",
         tuple(sorted(one.sensors)),
         one.start_s,
         one.end_s,

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
-from handstudio.health.findings import PER_SENSOR, Finding, Kind
+from handstudio.health.findings import PER_SENSOR, Finding, Kind, Level
 from handstudio.health.limits import KEEP, LIMITS, OFF_S
 
 _A_MOMENT_S = 1e-3  # sums of windows end a rounding before what they should be
@@ -48,18 +48,18 @@ class Latch:
     def findings(self) -> list[Finding]:
         """What is on, the worse first."""
         note, act = self.on
-        found = []
-        for level, row, on in (("act", 1, act), ("note", 0, note & ~act)):
-            where = np.flatnonzero(on)
-            if len(where):
-                found.append(
-                    Finding(
-                        self.kind,
-                        "act" if level == "act" else "note",
-                        tuple(map(int, where)) if self.kind in PER_SENSOR else (),
-                        float(self.shown[where].max()),
-                        float(self._limits[row, 0]),
-                        float(self._began_s[row, where].min()),
-                    )
-                )
-        return found
+        found = [self._finding("act", 1, act), self._finding("note", 0, note & ~act)]
+        return [finding for finding in found if finding is not None]
+
+    def _finding(self, level: Level, row: int, on: Bool[Array, " k"]) -> Finding | None:
+        where = np.flatnonzero(on)
+        if len(where) == 0:
+            return None
+        return Finding(
+            self.kind,
+            level,
+            tuple(map(int, where)) if self.kind in PER_SENSOR else (),
+            float(self.shown[where].max()),
+            float(self._limits[row, 0]),
+            float(self._began_s[row, where].min()),
+        )
