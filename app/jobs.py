@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
@@ -51,6 +53,15 @@ class Jobs:
 def _begin(share: Synchronized[float]) -> None:
     global _share  # noqa: PLW0603 - set once, when the job's process starts
     _share = share
+    threading.Thread(target=_end_with_the_studio, name="parent", daemon=True).start()
+
+
+def _end_with_the_studio() -> None:
+    """A studio that is killed says nothing: without this its job process would wait for ever."""
+    studio = multiprocessing.parent_process()
+    if studio is not None:
+        studio.join()
+        os._exit(1)
 
 
 def _tell(share: float) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable, Iterator
-from itertools import islice
 from typing import TypeAlias
 
 import numpy as np
@@ -164,6 +163,7 @@ def damaged(wire: bytearray, rng: np.random.Generator) -> int:
 
 def pieces(wire: bytes, rng: np.random.Generator) -> Iterator[bytes]:
     """Cut as a line cuts: anywhere."""
-    rest = iter(wire)
-    while piece := bytes(islice(rest, int(rng.choice([1, 64, 500, 4096])))):
-        yield piece
+    while wire:
+        cut = int(rng.choice([1, 64, 500, 4096]))
+        yield wire[:cut]
+        wire = wire[cut:]
