@@ -254,7 +254,10 @@ def read_again(take: Take) -> tuple[int, int]:
     setup = take.header.setup
     assert setup.decoder is not None
     # what was held of a half frame when the take began stands in its first state
-    stream = EventStream.resumed(setup.decoder, setup.ranges, take.first_state.stream)
+    held = take.first_state.stream
+    stream = EventStream(setup.decoder, setup.ranges)
+    if held:
+        stream = EventStream.resumed(setup.decoder, setup.ranges, held)
     instants = missing = 0
     for arrival_ns, chunk in take.chunks():
         packets, _ = stream.feed(chunk, arrival_ns)
