@@ -20,6 +20,13 @@ else:
     _FAILURES = (serial.SerialException, OSError, ValueError, termios.error)
 
 
+_FULL = 3000
+"""The system hands over 4095 bytes at a time: with so many there are more behind them."""
+
+_AT_ONCE = 32768
+"""Whoever is behind reads up to so many bytes together: long runs cost less to fuse."""
+
+
 class SerialSource:
     """A serial port or pseudo-terminal, for us alone."""
 
@@ -35,10 +42,17 @@ class SerialSource:
         """Bytes that are there, waiting up to a time for the first."""
         try:
             self._wait(timeout_s)
-            waiting = self._port.in_waiting
-            return bytes(self._port.read(max(1, waiting)))
+            data = piece = self._read()
         except (*_FAILURES, TypeError) as error:
             raise SourceLost(str(error)) from error
+        with contextlib.suppress(*_FAILURES, TypeError):  # the next read tells
+            while len(piece) >= _FULL and len(data) < _AT_ONCE and self._port.in_waiting:
+                piece = self._read()
+                data += piece
+        return data
+
+    def _read(self) -> bytes:
+        return bytes(self._port.read(max(1, self._port.in_waiting)))
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
