@@ -74,13 +74,13 @@ _HALF_WIDTH_OF_MESH = {"phalanx": 0.12, "metacarpal": 0.10, "forearm": 0.11}
 
 def _forearm(skeleton: Skeleton) -> list[_Bone]:
     length = skeleton.t_parent_joint[SEGMENTS.index("hand")]
-    width = _FOREARM_WIDTH * 0.11 * _hand_length(skeleton)
+    width = _FOREARM_WIDTH * 0.11 * hand_length(skeleton)
     return [_Bone("forearm", "forearm", np.zeros(3), length, width)]
 
 
 def _palm(skeleton: Skeleton) -> list[_Bone]:
     bones = []
-    hand = _hand_length(skeleton)
+    hand = hand_length(skeleton)
     for finger in FINGERS[1:]:
         mcp = SEGMENTS.index(f"{finger}_proximal")
         block = SEGMENTS[PARENTS[mcp]]
@@ -92,7 +92,7 @@ def _palm(skeleton: Skeleton) -> list[_Bone]:
 
 def _digits(skeleton: Skeleton) -> list[_Bone]:
     bones = []
-    hand = _hand_length(skeleton)
+    hand = hand_length(skeleton)
     tips = dict(zip(DISTALS, skeleton.t_distal_tip, strict=True))
     for index, segment in enumerate(SEGMENTS):
         finger, _, kind = segment.partition("_")
@@ -106,7 +106,7 @@ def _digits(skeleton: Skeleton) -> list[_Bone]:
     return bones
 
 
-def _hand_length(skeleton: Skeleton) -> float:
+def hand_length(skeleton: Skeleton) -> float:
     """From the wrist to the middle fingertip, fingers straight [m]."""
     chain = ("middle_proximal", "middle_intermediate", "middle_distal")
     inner = sum(

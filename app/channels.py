@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from app import colours
-from app.words import _
+from app.words import _, language
 from handstudio.arrays import Array
 from handstudio.kinematics import angles_of, measured_angles, relative_rotations
 from handstudio.layout import Layout
@@ -40,7 +40,7 @@ class Plot:
 def plots_of(layout: Layout) -> tuple[Plot, ...]:
     """The plots of a layout, top to bottom."""
     if layout.is_hand:
-        return tuple(plot for plot, _names in _hand_plots(layout))
+        return tuple(plot for plot, _names in _hand_plots(layout, language()))
     return _sensor_plots(layout)
 
 
@@ -48,14 +48,18 @@ def values_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
     """Values of all curves in the order of the plots [deg]."""
     if setup.layout.is_hand:
         by_name = {angle.name: angle for angle in measured_angles(setup.layout)}
-        wanted = [by_name[name] for _plot, names in _hand_plots(setup.layout) for name in names]
+        wanted = [
+            by_name[name]
+            for _plot, names in _hand_plots(setup.layout, language())
+            for name in names
+        ]
         degrees: Array = np.rad2deg(angles_of(setup, motion, wanted))
         return degrees
     return _sensor_values(setup.layout, motion)
 
 
 @cache
-def _hand_plots(layout: Layout) -> tuple[tuple[Plot, tuple[str, ...]], ...]:
+def _hand_plots(layout: Layout, _language: str) -> tuple[tuple[Plot, tuple[str, ...]], ...]:
     measured = {angle.name for angle in measured_angles(layout)}
     fingers = ("index", "middle", "ring", "little")
     groups: list[tuple[str, list[str], Callable[[str], str]]] = [

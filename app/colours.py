@@ -14,6 +14,8 @@ WRIST = (226, 216, 178)
 FOREARM = (150, 162, 184)
 ALARM = (226, 75, 74)
 DEAD = (104, 108, 116)
+BOARD = (70, 92, 120)
+LIT = (255, 236, 92)
 
 PARTS = {
     "thumb": THUMB,
@@ -40,9 +42,11 @@ def of_index(index: int) -> tuple[int, int, int]:
     return _CYCLE[index % len(_CYCLE)]
 
 
-def css(colour: tuple[int, int, int]) -> str:
-    """A colour as a page writes it."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+def css(colour: tuple[int, int, int], dark: bool = True) -> str:
+    """A colour as a page writes it; on a light page pale ones are deepened to be seen."""
+    brightness = (299 * colour[0] + 587 * colour[1] + 114 * colour[2]) / 255_000
+    share = 1.0 if dark else min(1.0, 0.55 / brightness)
+    return "#{:02x}{:02x}{:02x}".format(*(round(share * channel) for channel in colour))
 
 
 def pale(colour: tuple[int, int, int]) -> tuple[int, int, int]:

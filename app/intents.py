@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from app.look import View
 from handstudio.export.csv import Content
 
 
@@ -34,10 +35,27 @@ class BlinkSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class SetSubject:
-    """Whose takes are recorded from now on."""
+class ChooseSubject:
+    """Whose takes are recorded from now on; an empty code: nobody's yet."""
 
     code: str
+
+
+@dataclass(frozen=True, slots=True)
+class SaveSubject:
+    """A person, new or known, as typed; recording may have waited for it."""
+
+    code: str
+    side: str
+    hand_length_mm: float
+    then_record: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SetVisit:
+    """What this visit is called; empty: by its day."""
+
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,15 +66,176 @@ class SetTakeName:
 
 
 @dataclass(frozen=True, slots=True)
-class SetHandLength:
-    """The wearer's hand length [mm]."""
+class SetCountdown:
+    """How long to count before a take begins [s]; 0: not at all."""
 
-    mm: float
+    seconds: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetSounds:
+    """Whether start, stop and marks are to be heard."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetTheme:
+    """A dark page or a light one."""
+
+    dark: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetLanguage:
+    """The language of the page; empty: the browser's, or the system's."""
+
+    language: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetView:
+    """Look at the hand from there."""
+
+    view: View
+
+
+@dataclass(frozen=True, slots=True)
+class SetShown:
+    """Show or hide a kind of thing on the hand."""
+
+    part: str
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleShown:
+    """Show it where it is hidden, hide it where it is shown."""
+
+    part: str
+
+
+@dataclass(frozen=True, slots=True)
+class GoOn:
+    """The space bar: play or pause the open take; else record or stop."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
+class PutMark:
+    """This moment is worth finding again, in the take that is recorded or open."""
+
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveMark:
+    """The mark at this time [s] goes."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class GoToMark:
+    """On to the next mark of the open take, or back to the one before."""
+
+    forward: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NamePart:
+    """The part of the open take that counts is called so."""
+
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetNotes:
+    """The words beside the open take."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Show the takes in which all these words occur."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RenameTake:
+    """A file of the library gets another name."""
+
+    path: Path
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class BinTake:
+    """A file of the library goes to the bin."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Take the last change to the library back."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreTake:
+    """A take of the bin goes back where it was."""
+
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class CancelWork:
+    """The long work that is on is no longer wanted."""
+
+
+@dataclass(frozen=True, slots=True)
+class EmptyBin:
+    """What is in the bin goes for good."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeleteSubject:
+    """A person and all that was recorded of them goes for good."""
+
+    code: str
+    typed: str
+
+
+@dataclass(frozen=True, slots=True)
+class SendDiagnostics:
+    """A file for whoever helps, without anything of the people recorded."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
+class PagesOpen:
+    """So many pages are open, and the languages the newest asks for, best first."""
+
+    count: int
+    languages: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ToggleRecording:
-    """Start a take, or end the one that is on."""
+    """Start a take, or end the one that is on, or the count before it."""
+
+    page: int = -1  # which page asked: it may have to be asked back
+
+
+@dataclass(frozen=True, slots=True)
+class PageShown:
+    """The slowest page answered what it was sent after so long [ms]; None: none answers."""
+
+    ms: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +326,34 @@ Intent: TypeAlias = (
     | ConnectDevice
     | DisconnectDevice
     | BlinkSensor
-    | SetSubject
+    | ChooseSubject
+    | SaveSubject
+    | SetVisit
     | SetTakeName
-    | SetHandLength
+    | SetCountdown
+    | SetSounds
+    | SetTheme
+    | SetLanguage
+    | SetView
+    | SetShown
+    | ToggleShown
+    | GoOn
+    | PutMark
+    | RemoveMark
+    | GoToMark
+    | NamePart
+    | SetNotes
+    | Search
+    | RenameTake
+    | BinTake
+    | Undo
+    | RestoreTake
+    | CancelWork
+    | EmptyBin
+    | DeleteSubject
+    | SendDiagnostics
+    | PagesOpen
+    | PageShown
     | ToggleRecording
     | OpenTake
     | RecoverTake

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
+from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.process import process
 from handstudio.recording.take import open_take
 
-_share: Synchronized[float] | None = None  # in the job's process: where it tells how far it is
+# In the job's process: where it tells how far it is, and whether it is to stop.
+_share: Synchronized[float] | None = None
+_stop: Synchronized[int] | None = None
+
+
+class Stopped(HandstudioError):  # noqa: N818 - nothing went wrong
+    """Somebody no longer wanted it."""
 
 
 class Jobs:
@@ -20,8 +29,12 @@ class Jobs:
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._done: Synchronized[float] = context.Value("d", 0.0)
+        self._cancelled: Synchronized[int] = context.Value("i", 0)
         self._pool = ProcessPoolExecutor(
-            max_workers=1, mp_context=context, initializer=_begin, initargs=(self._done,)
+            max_workers=1,
+            mp_context=context,
+            initializer=_begin,
+            initargs=(self._done, self._cancelled),
         )
 
     @property
@@ -35,27 +48,45 @@ class Jobs:
 
     def process(self, path: Path) -> Future[None]:
         """Compute the motion of a take, so that opening it finds it."""
-        self._done.value = 0.0
+        self._reset()
         return self._pool.submit(_process, path)
 
     def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
         """Write a CSV of a part of a take."""
-        self._done.value = 0.0
+        self._reset()
         return self._pool.submit(_export, path, target, content, window)
+
+    def cancel(self) -> None:
+        """Stop the present job at its next step; its future then raises `Stopped`."""
+        self._cancelled.value = 1
+
+    def _reset(self) -> None:
+        self._done.value, self._cancelled.value = 0.0, 0
 
     def close(self) -> None:
         """End; a job that runs is abandoned."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _begin(share: Synchronized[float]) -> None:
-    global _share  # noqa: PLW0603 - set once, when the job's process starts
-    _share = share
+def _begin(share: Synchronized[float], stop: Synchronized[int]) -> None:
+    global _share, _stop
+    _share, _stop = share, stop
+    threading.Thread(target=_end_with_the_studio, name="parent", daemon=True).start()
+
+
+def _end_with_the_studio() -> None:
+    """A studio that is killed says nothing: without this its job process would wait for ever."""
+    studio = multiprocessing.parent_process()
+    if studio is not None:
+        studio.join()
+        os._exit(1)
 
 
 def _tell(share: float) -> None:
     if _share is not None:
         _share.value = share
+    if _stop is not None and _stop.value:
+        raise Stopped("It was stopped.", "Nothing was changed.")
 
 
 def _nothing() -> None:

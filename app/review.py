@@ -11,6 +11,7 @@ from app.channels import values_of
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.pipeline import Motion
+from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
@@ -34,6 +35,7 @@ class Review:
     in_s: float = 0.0  # the part that is played and exported
     out_s: float | None = None  # None: to the end
     loop: bool = False
+    notes: Notes = Notes()
 
     @property
     def setup(self) -> Setup:
@@ -126,3 +128,13 @@ def marked_out(review: Review) -> Review:
 def whole(review: Review) -> Review:
     """The whole take counts."""
     return replace(review, in_s=0.0, out_s=None)
+
+
+def at_next_mark(review: Review, *, forward: bool) -> Review:
+    """On to the next mark, or back to the one before; where there is none, to the take's end."""
+    apart = 1e-6 if forward else -1e-6
+    marks = [mark.at_s for mark in review.notes.marks]
+    if forward:
+        ahead = [at for at in marks if at > review.at_s + apart]
+        return sought(review, min(ahead, default=review.duration_s))
+    return sought(review, max((at for at in marks if at < review.at_s + apart), default=0.0))

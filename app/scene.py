@@ -6,16 +6,23 @@ import numpy as np
 import viser
 
 from app import colours
-from app.bones import BoneSet, bone_sets, joint_radii
+from app.boards import BOARD_M, Boards, boards_of
+from app.bones import BoneSet, bone_sets, hand_length, joint_radii
+from app.look import DESK_TARGET, Camera
 from app.meshes import mesh
-from app.view import HandView, SensorsView
+from app.views.page import HandView, SensorsView
 from handstudio.arrays import Array
 from handstudio.hand.skeleton import SEGMENTS, Skeleton
+from handstudio.layout import Layout
 from handstudio.maths import so3
+from handstudio.settings import Shown
 
 _FLOOR_M = -0.06
-_BOARD_M = 0.05  # drawn size of a sensor where there is no hand
+_BOARD_ALONE_M = 0.05  # drawn size of a sensor where there is no hand
 _APART_M = 0.12
+_AXES_M = 0.014
+
+_CELLS = {True: ((58, 62, 70), (84, 90, 100)), False: ((206, 210, 216), (176, 182, 190))}
 
 
 class Scene:
@@ -23,24 +30,23 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._skeleton: Skeleton | None = None
-        self._sets: tuple[BoneSet, ...] = ()
-        self._bones: dict[str, viser.BatchedMeshHandle] = {}
-        self._joints: viser.BatchedMeshHandle | None = None
-        self._sensors: dict[str, viser.SceneNodeHandle] = {}
         self._root = server.scene.add_frame("/hand", show_axes=False)
-        self._shown: tuple[Array, ...] = ()
-        _furnish(server)
+        self._hand = _HandNodes(server)
+        self._boards = _BoardNodes(server)
+        self._sensors: dict[str, viser.SceneNodeHandle] = {}
+        self._dark: bool | None = None
+        self._label: viser.LabelHandle | None = None
+        self._words = ""
+        server.scene.set_up_direction("+z")
 
-    def render(self, view: HandView | SensorsView | None, yaw: float | None) -> None:
+    def render(self, view: HandView | SensorsView | None, yaw: float | None, shown: Shown) -> None:
         """Show a hand, bare sensors, or nothing."""
         self._root.wxyz = so3.about_z(yaw or 0.0)
         match view:
             case HandView():
                 self._clear_sensors()
-                if view.skeleton is not self._skeleton:
-                    self._build(view.skeleton)
-                self._move(view)
+                self._hand.render(view, visible=shown.bones)
+                self._boards.render(view, shown)
             case SensorsView():
                 self._clear_hand()
                 self._show_sensors(view)
@@ -48,8 +54,102 @@ class Scene:
                 self._clear_hand()
                 self._clear_sensors()
 
+    def say(self, words: str) -> None:
+        """Words in the middle of the picture; none: nothing."""
+        if words == self._words:
+            return
+        self._words = words
+        if self._label is not None:
+            self._label.remove()
+            self._label = None
+        if words:
+            self._label = self._server.scene.add_label(
+                "/words", words, position=DESK_TARGET, font_screen_scale=1.3, anchor="center-center"
+            )
+
+    def furnish(self, dark: bool) -> None:
+        """Floor, light and background of a dark or a light room."""
+        if dark == self._dark:
+            return
+        self._dark = dark
+        _furnish(self._server, dark)
+
+    def aim(self, camera: Camera) -> None:
+        """Point every page's camera, and those of the pages to come."""
+        first = self._server.initial_camera
+        first.position, first.look_at, first.up = camera.place, camera.target, camera.up
+        for client in self._server.get_clients().values():
+            with client.atomic():
+                client.camera.up_direction = camera.up
+                client.camera.position = camera.place
+                client.camera.look_at = camera.target
+
+    def _clear_hand(self) -> None:
+        self._hand.clear()
+        self._boards.clear()
+
+    def _show_sensors(self, view: SensorsView) -> None:
+        middle = (len(view.names) - 1) / 2
+        for i, name in enumerate(view.names):
+            if name not in self._sensors:
+                self._add_sensor(name, i)
+            self._sensors[name].wxyz = view.q_world_sensor[i]
+            self._sensors[name].position = np.array([(i - middle) * _APART_M, 0.25, 0.05])
+
+    def _add_sensor(self, name: str, index: int) -> None:
+        vertices, faces = mesh("sensor")
+        frame = self._server.scene.add_frame(
+            f"/sensors/{name}", axes_length=_BOARD_ALONE_M, axes_radius=_BOARD_ALONE_M / 40
+        )
+        self._server.scene.add_mesh_simple(
+            f"/sensors/{name}/board",
+            vertices * _BOARD_ALONE_M,
+            faces,
+            color=colours.of_index(index),
+        )
+        self._server.scene.add_label(
+            f"/sensors/{name}/name", name, position=(0.0, 0.0, 0.7 * _BOARD_ALONE_M)
+        )
+        self._sensors[name] = frame
+
+    def _clear_sensors(self) -> None:
+        for handle in self._sensors.values():
+            handle.remove()
+        self._sensors.clear()
+
+
+class _HandNodes:
+    """Bones and joints."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._skeleton: Skeleton | None = None
+        self._sets: tuple[BoneSet, ...] = ()
+        self._bones: dict[str, viser.BatchedMeshHandle] = {}
+        self._joints: viser.BatchedMeshHandle | None = None
+        self._tinted: tuple[Array, ...] = ()
+
+    def render(self, view: HandView, *, visible: bool) -> None:
+        if view.skeleton is not self._skeleton:
+            self._build(view.skeleton)
+        for handle in (*self._bones.values(), self._joints):
+            if handle is not None and handle.visible != visible:
+                handle.visible = visible
+        if visible:
+            self._move(view)
+            self._tint(view)
+
+    def clear(self) -> None:
+        for handle in self._bones.values():
+            handle.remove()
+        self._bones.clear()
+        if self._joints is not None:
+            self._joints.remove()
+            self._joints = None
+        self._skeleton, self._sets, self._tinted = None, (), ()
+
     def _build(self, skeleton: Skeleton) -> None:
-        self._clear_hand()
+        self.clear()
         self._skeleton = skeleton
         self._sets = bone_sets(skeleton)
         for bones in self._sets:
@@ -69,14 +169,13 @@ class Scene:
 
     def _build_joints(self, skeleton: Skeleton) -> None:
         vertices, faces = mesh("joint")
-        size = skeleton.length_m[SEGMENTS.index("forearm")] / 1.352  # hand length
         self._joints = self._server.scene.add_batched_meshes_simple(
             "/hand/joint",
             vertices,
             faces,
             batched_wxyzs=np.tile(so3.IDENTITY, (len(SEGMENTS), 1)),
             batched_positions=np.zeros((len(SEGMENTS), 3)),
-            batched_scales=joint_radii()[:, None] * _ball_shape() * size,
+            batched_scales=joint_radii()[:, None] * _ball_shape() * hand_length(skeleton),
             batched_colors=np.array([colours.of_part(s) for s in SEGMENTS], dtype=np.uint8),
             lod="off",
         )
@@ -88,16 +187,13 @@ class Scene:
         if self._joints is not None:
             self._joints.batched_positions = view.pose.t_world_joint
             self._joints.batched_wxyzs = view.pose.q_world_segment
-        self._tint(view)
 
     def _tint(self, view: HandView) -> None:
         """Colours tell state; sent only when one changes."""
         shown = (view.doubtful, view.dead)
-        if len(self._shown) == 2 and all(
-            np.array_equal(a, b) for a, b in zip(shown, self._shown, strict=True)
-        ):
+        if len(self._tinted) == 2 and all(map(np.array_equal, shown, self._tinted)):
             return
-        self._shown = shown
+        self._tinted = shown
         for bones in self._sets:
             self._bones[bones.mesh].batched_colors = np.array(
                 [
@@ -115,43 +211,99 @@ class Scene:
                 dtype=np.uint8,
             )
 
-    def _show_sensors(self, view: SensorsView) -> None:
-        middle = (len(view.names) - 1) / 2
-        for i, name in enumerate(view.names):
-            if name not in self._sensors:
-                self._add_sensor(name, i)
-            self._sensors[name].wxyz = view.q_world_sensor[i]
-            self._sensors[name].position = np.array([(i - middle) * _APART_M, 0.25, 0.05])
 
-    def _add_sensor(self, name: str, index: int) -> None:
-        vertices, faces = mesh("sensor")
-        frame = self._server.scene.add_frame(
-            f"/sensors/{name}", axes_length=_BOARD_M, axes_radius=_BOARD_M / 40
-        )
-        self._server.scene.add_mesh_simple(
-            f"/sensors/{name}/board",
-            vertices * _BOARD_M,
-            faces,
-            color=colours.of_index(index),
-        )
-        self._server.scene.add_label(
-            f"/sensors/{name}/name", name, position=(0.0, 0.0, 0.7 * _BOARD_M)
-        )
-        self._sensors[name] = frame
+class _BoardNodes:
+    """The sensors on the hand: boards, their axes, their names, and the one that is lit."""
 
-    def _clear_hand(self) -> None:
-        for handle in self._bones.values():
-            handle.remove()
-        self._bones.clear()
-        if self._joints is not None:
-            self._joints.remove()
-            self._joints = None
-        self._skeleton, self._sets, self._shown = None, (), ()
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._made_for: tuple[Layout, Skeleton] | None = None
+        self._boards: Boards | None = None
+        self._mesh: viser.BatchedMeshHandle | None = None
+        self._axes: viser.BatchedAxesHandle | None = None
+        self._names: dict[str, viser.LabelHandle] = {}
+        self._lit: frozenset[str] = frozenset()
 
-    def _clear_sensors(self) -> None:
-        for handle in self._sensors.values():
-            handle.remove()
-        self._sensors.clear()
+    def render(self, view: HandView, shown: Shown) -> None:
+        if not (shown.sensors or shown.axes or shown.labels or view.lit):
+            self.clear()
+            return
+        if self._made_for is None or self._made_for != (view.layout, view.skeleton):
+            self.clear()
+            self._made_for = view.layout, view.skeleton
+            self._boards = boards_of(view.layout, view.skeleton)
+        if self._boards is None or not self._boards.names:
+            return
+        attitudes, places = self._boards.placed(view.pose)
+        self._render_mesh(attitudes, places, shown.sensors or bool(view.lit))
+        self._light(view.lit)
+        self._render_axes(attitudes, places, shown.axes)
+        named = set(self._boards.names) if shown.labels else set(view.lit)
+        self._render_names(attitudes, places, named)
+
+    def clear(self) -> None:
+        for handle in (self._mesh, self._axes, *self._names.values()):
+            if handle is not None:
+                handle.remove()
+        self._made_for, self._boards, self._mesh, self._axes = None, None, None, None
+        self._names.clear()
+        self._lit = frozenset()
+
+    def _render_mesh(self, attitudes: Array, places: Array, wanted: bool) -> None:
+        if not wanted:
+            if self._mesh is not None:
+                self._mesh.remove()
+                self._mesh, self._lit = None, frozenset()
+            return
+        if self._mesh is None and self._boards is not None:
+            vertices, faces = mesh("sensor")
+            self._mesh = self._server.scene.add_batched_meshes_simple(
+                "/hand/boards",
+                vertices * BOARD_M,
+                faces,
+                batched_wxyzs=attitudes,
+                batched_positions=places,
+                batched_colors=np.array(self._tints(frozenset()), dtype=np.uint8),
+                lod="off",
+            )
+        if self._mesh is not None:
+            self._mesh.batched_wxyzs, self._mesh.batched_positions = attitudes, places
+
+    def _light(self, lit: frozenset[str]) -> None:
+        if self._mesh is not None and lit != self._lit:
+            self._lit = lit
+            self._mesh.batched_colors = np.array(self._tints(lit), dtype=np.uint8)
+
+    def _tints(self, lit: frozenset[str]) -> list[tuple[int, int, int]]:
+        names = self._boards.names if self._boards is not None else ()
+        return [colours.LIT if name in lit else colours.BOARD for name in names]
+
+    def _render_axes(self, attitudes: Array, places: Array, wanted: bool) -> None:
+        if not wanted:
+            if self._axes is not None:
+                self._axes.remove()
+                self._axes = None
+            return
+        if self._axes is None:
+            self._axes = self._server.scene.add_batched_axes(
+                "/hand/axes", attitudes, places, axes_length=_AXES_M, axes_radius=_AXES_M / 16
+            )
+        self._axes.batched_wxyzs, self._axes.batched_positions = attitudes, places
+
+    def _render_names(self, attitudes: Array, places: Array, wanted: set[str]) -> None:
+        for gone in self._names.keys() - wanted:
+            self._names.pop(gone).remove()
+        if self._boards is None:
+            return
+        above = places + so3.rotate(attitudes, np.array([0.0, 0.0, 0.6 * BOARD_M]))
+        for i, name in enumerate(self._boards.names):
+            if name not in wanted:
+                continue
+            if name not in self._names:
+                self._names[name] = self._server.scene.add_label(
+                    f"/hand/names/{name}", name, font_screen_scale=0.8, anchor="bottom-center"
+                )
+            self._names[name].position = above[i]
 
 
 def _ball_shape() -> Array:
@@ -167,8 +319,8 @@ def _tinted(colour: tuple[int, int, int], doubtful: bool, dead: bool) -> tuple[i
     return colours.pale(colour) if doubtful else colour
 
 
-def _furnish(server: viser.ViserServer) -> None:
-    server.scene.set_up_direction("+z")
+def _furnish(server: viser.ViserServer, dark: bool) -> None:
+    cell, section = _CELLS[dark]
     server.scene.add_grid(
         "/floor",
         width=2.0,
@@ -176,11 +328,11 @@ def _furnish(server: viser.ViserServer) -> None:
         plane="xy",
         cell_size=0.05,
         section_size=0.25,
-        cell_color=(58, 62, 70),
-        section_color=(84, 90, 100),
+        cell_color=cell,
+        section_color=section,
         fade_distance=1.6,
         position=(0.0, 0.25, _FLOOR_M),
-        shadow_opacity=0.25,
+        shadow_opacity=0.25 if dark else 0.12,
     )
     # dimmer than viser's own light, which bleaches the colours that tell fingers apart
     server.scene.configure_default_lights(enabled=False)
@@ -188,6 +340,4 @@ def _furnish(server: viser.ViserServer) -> None:
     server.scene.add_light_directional(
         "/light", intensity=1.1, position=(-0.3, -0.2, 1.0), cast_shadow=True
     )
-    server.initial_camera.position = (-0.13, 0.02, 0.40)
-    server.initial_camera.look_at = (0.0, 0.31, 0.0)
-    server.initial_camera.up = (0.0, 0.0, 1.0)
+    server.scene.add_light_ambient("/fill", intensity=0.55)  # the palm turns away from the light

@@ -6,99 +6,52 @@ Knows no viser; one thread calls `Studio.tick`, any thread may call `Studio.send
 from __future__ import annotations
 
 import queue
-import threading
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from app import intents
+from app import diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
-from app.jobs import Jobs
-from app.live import LiveHistory
+from app.jobs import Jobs, Stopped
+from app.keeping import Keeper
+from app.look import LASTING, View
+from app.looking import Looked, Looker
 from app.review import Review
+from app.sounds import Sound
+from app.state import Download, Message, State, Work
+from app.takes import Taker
 from app.words import _
-from handstudio.device import find
 from handstudio.device.capture import Capture
-from handstudio.device.find import Found
 from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
-    Newest,
+    NotePage,
     Phase,
     SetHand,
-    StartTake,
-    StopTake,
     TakeDone,
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Window
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.kinematics import segment_attitudes
 from handstudio.maths import so3
 from handstudio.process import kept_motion
 from handstudio.protocol.packets import TIP_SENSOR, Command
-from handstudio.recording import library
-from handstudio.recording.library import Entry
+from handstudio.recording import notes as noting
 from handstudio.recording.recovery import recover
 from handstudio.recording.take import Take, open_take
+from handstudio.settings import SettingsStore
 from handstudio.setup import HandModel
 
-HAND_LENGTH_MM = (120.0, 240.0)
-"""Plausible hand lengths, children to the largest adults [mm]."""
-
 _BLINK_MS = 3000
+_ONCE_S = 0.4  # the space bar is a key of the page, and also presses the button clicked last
 _FORWARD = np.pi / 2  # the forearm points along y of the picture, away from the viewer
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """Something to tell the person once."""
-
-    text: str
-    remedy: str = ""
-    alarm: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Download:
-    """A file for one page."""
-
-    page: int
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """A job that runs, in words, and how far it is."""
-
-    words: str
-    share: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
-    """Everything the page is drawn from, besides the newest of the capture."""
-
-    sessions: Path
-    newest: Newest = Newest()
-    subject: str = "S01"
-    take_name: str = "take"
-    hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3
-    devices: tuple[Found, ...] = (find.VIRTUAL,)
-    searching: bool = False
-    takes: tuple[Entry, ...] = ()
-    live: LiveHistory | None = None
-    review: Review | None = None
-    work: Work | None = None
-    yaw: float | None = None  # turn of the picture about the vertical; None: find it anew
-    messages: tuple[Message, ...] = ()
-    downloads: tuple[Download, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +64,17 @@ class _SendFile:
     page: int
 
 
+@dataclass(frozen=True, slots=True)
+class _SendDiagnostics:
+    page: int
+
+
 @dataclass
 class _Pending:
     """Work whose end is waited for."""
 
     future: Future[Any]
-    then: _ShowTake | _SendFile
+    then: _ShowTake | _SendFile | _SendDiagnostics
     words: str
 
 
@@ -126,11 +84,23 @@ class Studio:
 
     capture: Capture
     jobs: Jobs
+    store: SettingsStore
     state: State
-    _inbox: queue.SimpleQueue[intents.Intent | tuple[Found, ...]] = field(
-        default_factory=queue.SimpleQueue
-    )
+    language: str | None = None  # asked for at the start; until another is chosen on the page
+    _inbox: queue.SimpleQueue[intents.Intent | Looked] = field(default_factory=queue.SimpleQueue)
     _pending: list[_Pending] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._keeper = Keeper(self.state.sessions)
+        self._taker = Taker(self.capture, self.state.sessions)
+        self._looker = Looker(self._inbox.put)
+        self._aside = ThreadPoolExecutor(1, "aside")
+        self._now_s = 0.0
+        self._toggled_s = -1.0
+        self._change()
+        kept = [view for view in LASTING if view.value == self.store.settings.camera]
+        self.state = replace(self.state, view=kept[0] if kept else View.DESK)
+        self._speak(())
 
     def send(self, intent: intents.Intent) -> None:
         """Ask for something; returns at once. For any thread."""
@@ -138,66 +108,172 @@ class Studio:
 
     def tick(self, elapsed_s: float) -> State:
         """Take in all that happened; the state afterwards."""
-        self.state = replace(self.state, messages=(), downloads=())
+        self.state = replace(self.state, messages=(), downloads=(), sounds=(), asking=None)
         while True:
             try:
                 item = self._inbox.get_nowait()
             except queue.Empty:
                 break
-            try:
-                self._obey(item)
-            except HandstudioError as error:
-                self._say(error)
+            self._try(item)
         self._hear_capture()
         self._finish_work()
+        self._take_on(elapsed_s)
+        idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
+        self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
+        self.state = replace(self.state, searching=self._looker.busy)
         review = self.state.review
         if review is not None and review.playing:
             self.state = replace(self.state, review=reviewing.advanced(review, elapsed_s))
         self._face_once()
+        self.state = replace(self.state, shelf=self._keeper.shelf)
+        self._keep_settings(elapsed_s)
         return self.state
 
     def refresh_takes(self) -> None:
         """Read the library again."""
-        self.state = replace(self.state, takes=tuple(library.entries(self.state.sessions)))
+        self._keeper.refresh()
+        self.state = replace(self.state, shelf=self._keeper.shelf)
 
     # --- intents --------------------------------------------------------------------------------
 
-    def _obey(self, intent: intents.Intent | tuple[Found, ...]) -> None:  # noqa: PLR0912 - a list
+    def _try(self, item: intents.Intent | Looked) -> None:
+        try:
+            match item:
+                case Looked():
+                    self._hear_looker(item)
+                case _ if not (self._obey(item) or self._keep(item) or self._prefer(item)):
+                    self._move(item)
+        except HandstudioError as error:
+            self._say(error)
+
+    def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+        """Devices, recording, opening; False: it is about something else."""
         match intent:
-            case tuple():
-                self.state = replace(self.state, devices=intent, searching=False)
             case intents.FindDevices():
                 self._find()
             case intents.ConnectDevice(address=address):
-                self.state = replace(self.state, live=None, yaw=None, review=None)
-                self.capture.send(Connect(address, self._hand()))
+                self.state = replace(self.state, live=None, shaking=None, yaw=None, review=None)
+                self._change(last_address=address)
+                self.capture.send(Connect(address, self._hand(), self._side()))
             case intents.DisconnectDevice():
                 self.capture.send(Disconnect())
-                self.state = replace(self.state, live=None)
+                self.state = replace(self.state, live=None, shaking=None)
             case intents.BlinkSensor(name=name):
                 self._blink(name)
-            case intents.SetSubject(code=code):
-                self.state = replace(self.state, subject=code)
-            case intents.SetTakeName(name=name):
-                self.state = replace(self.state, take_name=name)
-            case intents.SetHandLength(mm=mm):
-                self._set_hand_length(mm)
-            case intents.ToggleRecording():
-                self._toggle_recording()
+            case intents.ToggleRecording(page=page):
+                self._toggle_recording(page)
+            case intents.GoOn(page=page):
+                if self.state.review is not None:
+                    self._move(intents.TogglePlay())
+                else:
+                    self._toggle_recording(page)
+            case intents.PutMark(text=text):
+                self._mark(text)
             case intents.OpenTake(path=path):
                 self._open(path)
             case intents.RecoverTake(path=path):
                 self._recover(path)
             case intents.ShowLive():
                 self.state = replace(self.state, review=None, yaw=None)
-            case intents.Export(content=content, page=page):
-                self._export(intents.Export(content, page))
+            case intents.Export():
+                self._export(intent)
+            case intents.CancelWork():
+                self.jobs.cancel()
+            case intents.SendDiagnostics(page=page):
+                self._send_diagnostics(page)
             case intents.FaceForward():
-                self.state = replace(self.state, yaw=None)
+                self.state = replace(self.state, yaw=None, aimed=self.state.aimed + 1)
+            case intents.SetView(view=view):
+                self._change(camera=view.value if view in LASTING else "")
+                self.state = replace(self.state, view=view, aimed=self.state.aimed + 1)
+            case intents.PagesOpen(count=count, languages=languages):
+                self.state = replace(self.state, pages=count)
+                if languages:
+                    self._speak(languages)
+            case intents.PageShown(ms=ms):
+                self.state = replace(self.state, page_ms=ms)
+                if ms is not None:
+                    self.capture.send(NotePage(ms))
             case _:
-                self._move(intent)
+                return False
+        return True
 
-    def _move(self, move: intents.Move) -> None:
+    def _keep(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+        """The library; False: it is about something else."""
+        keeper, review = self._keeper, self.state.review
+        match intent:
+            case intents.ChooseSubject(code=code):
+                self._change(subject=code)
+                self.capture.send(SetHand(self._hand()))
+            case intents.SaveSubject(then_record=then_record):
+                saved = keeper.save_subject(intent)
+                self._change(subject=saved.code)
+                self.capture.send(SetHand(self._hand()))
+                if then_record:
+                    self._toggle_recording(page=-1)
+            case intents.DeleteSubject(code=code, typed=typed):
+                if review is not None and review.take.header.subject == code:
+                    self.state = replace(self.state, review=None, yaw=None)
+                self._tell(keeper.delete_subject(code, typed))
+                if self.store.settings.subject == code:
+                    self._change(subject="")
+            case intents.Search(text=text):
+                keeper.search(text)
+            case intents.RenameTake(path=path, name=name):
+                self._reopen(path, keeper.rename(path, name))
+            case intents.BinTake(path=path):
+                if review is not None and review.take.path == path:
+                    self.state = replace(self.state, review=None, yaw=None)
+                self._tell(keeper.bin(path))
+            case intents.Undo():
+                undone = keeper.undo()
+                if undone is not None:
+                    self._tell(undone[0])
+                    self._reopen_notes(undone[1])
+            case intents.RestoreTake(key=key):
+                self._tell(keeper.restore(key))
+            case intents.EmptyBin():
+                self._tell(keeper.empty_bin())
+            case intents.SetNotes(text=text) if review is not None:
+                self._write_notes(review, noting.with_text(review.notes, text))
+            case intents.NamePart(label=label) if review is not None:
+                named = noting.with_label(review.notes, review.in_s, review.end_s, label)
+                self._write_notes(review, named)
+            case intents.RemoveMark(at_s=at_s) if review is not None:
+                for mark in [mark for mark in review.notes.marks if mark.at_s == at_s]:
+                    self._write_notes(review, noting.without_mark(review.notes, mark))
+            case _:
+                return False
+        return True
+
+    def _prefer(self, intent: intents.Intent) -> bool:
+        """Settings; False: it is about something else."""
+        change, shown = self._change, self.store.settings.shown
+        match intent:
+            case intents.SetVisit(name=name):
+                change(visit=name)
+            case intents.SetTakeName(name=name):
+                change(take_name=name)
+            case intents.SetCountdown(seconds=seconds):
+                change(countdown_s=seconds)
+            case intents.SetSounds(on=on):
+                change(sounds=on)
+            case intents.SetTheme(dark=dark):
+                change(theme="dark" if dark else "light")
+            case intents.SetLanguage(language=language):
+                change(language=language)
+                self.language = None
+                self._speak(())
+            case intents.SetShown(part=part, on=on):
+                change(shown=msgspec.structs.replace(shown, **{part: on}))
+            case intents.ToggleShown(part=part):
+                on = not getattr(shown, part)
+                change(shown=msgspec.structs.replace(shown, **{part: on}))
+            case _:
+                return False
+        return True
+
+    def _move(self, move: intents.Intent) -> None:
         review = self.state.review
         if review is None:
             return
@@ -218,49 +294,83 @@ class Studio:
                 review = reviewing.whole(review)
             case intents.SetLoop(on=on):
                 review = replace(review, loop=on)
+            case intents.GoToMark(forward=forward):
+                review = reviewing.at_next_mark(review, forward=forward)
         self.state = replace(self.state, review=review)
 
     def _find(self) -> None:
-        if self.state.searching:
-            return
-        self.state = replace(self.state, searching=True)
-        in_use = self.state.newest.address if self.state.newest.phase is not Phase.IDLE else ""
+        newest = self.state.newest
+        self._looker.look(newest.address if newest.phase is not Phase.IDLE else "")
 
-        def look() -> None:
-            found = tuple(
-                port if port.address == in_use else find.probe(port.address)
-                for port in find.ports()
+    def _hear_looker(self, looked: Looked) -> None:
+        self.state = replace(self.state, devices=looked.found)
+        for glove in looked.new:
+            self._tell(
+                _("{glove} was plugged in: connect it under Device.").format(glove=glove.label)
             )
-            self._inbox.put((*found, find.VIRTUAL))
-
-        threading.Thread(target=look, name="find devices", daemon=True).start()
 
     def _blink(self, name: str) -> None:
         number = TIP_SENSOR if name == "Tip" else int(name.removeprefix("SN"))
         argument = bytes([number]) + _BLINK_MS.to_bytes(2, "little")
         self.capture.send(Ask(Command.BLINK, argument))
 
-    def _set_hand_length(self, mm: float) -> None:
-        shortest, longest = HAND_LENGTH_MM
-        self.state = replace(self.state, hand_length_mm=min(max(mm, shortest), longest))
-        self.capture.send(SetHand(self._hand()))
-
     def _hand(self) -> HandModel:
-        return HandModel(hand_length_m=self.state.hand_length_mm * 1e-3)
+        """The hand of whoever is chosen now."""
+        state = replace(self.state, shelf=self._keeper.shelf)
+        return HandModel(hand_length_m=state.hand_length_mm * 1e-3)
 
-    def _toggle_recording(self) -> None:
-        if self.state.newest.recorder is not None:
-            self.capture.send(StopTake())
+    def _side(self) -> str:
+        """Which hand a device sits on that does not know it."""
+        subject = replace(self.state, shelf=self._keeper.shelf).subject
+        return (subject.side if subject is not None else "") or self.store.settings.side
+
+    # --- recording ------------------------------------------------------------------------------
+
+    def _toggle_recording(self, page: int) -> None:
+        if self._now_s - self._toggled_s < _ONCE_S:
             return
-        path = library.new_take_path(
-            self.state.sessions,
-            self.state.subject,
-            self.state.take_name,
-            datetime.now().astimezone(),
-        )
+        self._toggled_s = self._now_s
+        if self.state.newest.recorder is not None:
+            self._taker.stop()
+            self._sound(Sound.STOP)
+            return
+        if self._taker.countdown is not None:
+            self._taker.cancel()
+            return
+        if not self.state.newest.ready:
+            raise HandstudioError(
+                "There is no device to record from.", "Connect one under Device, then record."
+            )
+        settings = self.store.settings
+        if replace(self.state, shelf=self._keeper.shelf).subject is None:
+            self.state = replace(self.state, asking=page)
+            return
+        self._taker.begin(settings)
         if self.state.review is not None:
             self.state = replace(self.state, review=None, yaw=None)
-        self.capture.send(StartTake(path, self.state.subject))
+
+    def _take_on(self, elapsed_s: float) -> None:
+        """The countdown, the disk, and the end that comes by itself."""
+        try:
+            for sound in self._taker.tick(elapsed_s, self.state, self.store.settings):
+                self._sound(sound)
+        except HandstudioError as error:
+            self._sound(Sound.ALARM)
+            self._say(error)
+        taker = self._taker
+        self.state = replace(
+            self.state, countdown=taker.countdown, disk=taker.disk, marks=taker.marks
+        )
+
+    def _mark(self, text: str) -> None:
+        review = self.state.review
+        if self.state.newest.recorder is not None:
+            if self._taker.mark(text):
+                self._sound(Sound.MARK)
+        elif review is not None:
+            self._write_notes(review, noting.with_mark(review.notes, review.at_s, text))
+
+    # --- takes ----------------------------------------------------------------------------------
 
     def _recover(self, path: Path) -> None:
         recovered = recover(path)
@@ -275,11 +385,40 @@ class Studio:
         if motion is not None:
             self._show(reviewing.opened(take, motion))
             return
-        words = _("Computing the motion of {name}").format(name=path.stem)
-        self._pending.append(_Pending(self.jobs.process(path), _ShowTake(take), words))
+        text = _("Computing the motion of {name}").format(name=path.stem)
+        self._pending.append(_Pending(self.jobs.process(path), _ShowTake(take), text))
 
     def _show(self, review: Review) -> None:
-        self.state = replace(self.state, review=review, yaw=None)
+        notes = noting.Notes()
+        try:
+            notes = self._keeper.notes(review.take.path)
+        except HandstudioError as error:
+            self._say(error)
+        self.state = replace(self.state, review=replace(review, notes=notes), yaw=None)
+
+    def _reopen(self, before: Path, path: Path) -> None:
+        """A take that is open stays open where it is, under its other name."""
+        review = self.state.review
+        if review is not None and review.take.path == before:
+            take = replace(review.take, path=path)
+            self.state = replace(self.state, review=replace(review, take=take))
+
+    def _reopen_notes(self, path: Path) -> None:
+        """What was taken back may be a name or the notes of the take that is open."""
+        review = self.state.review
+        if review is None:
+            return
+        if not review.take.path.exists():
+            self._reopen(review.take.path, path)
+        review = self.state.review
+        if review is not None and review.take.path == path:
+            notes = self._keeper.notes(path)
+            self.state = replace(self.state, review=replace(review, notes=notes))
+
+    def _write_notes(self, review: Review, notes: noting.Notes) -> None:
+        if notes != review.notes:
+            self._keeper.write_notes(review.take.path, notes)
+            self.state = replace(self.state, review=replace(review, notes=notes))
 
     def _export(self, order: intents.Export) -> None:
         review = self.state.review
@@ -287,24 +426,42 @@ class Studio:
             return
         path = review.take.path
         target = path.with_suffix(f".{order.content}.csv")
-        words = _("Exporting {name}").format(name=target.name)
+        text = _("Exporting {name}").format(name=target.name)
         window = Window(review.in_s, review.out_s)
         future = self.jobs.export(path, target, order.content, window)
-        self._pending.append(_Pending(future, _SendFile(order.page), words))
+        self._pending.append(_Pending(future, _SendFile(order.page), text))
+
+    def _send_diagnostics(self, page: int) -> None:
+        settings = msgspec.to_builtins(self.store.settings)
+        work = partial(
+            diagnostics.make,
+            self.state.newest,
+            settings=settings,
+            sessions=self.state.sessions,
+            takes=self._keeper.shelf.takes,
+            names=(self.store.settings.subject, self.store.settings.take_name),
+        )
+        text = _("Gathering diagnostics")
+        self._pending.append(_Pending(self._aside.submit(work), _SendDiagnostics(page), text))
 
     # --- reports --------------------------------------------------------------------------------
 
     def _hear_capture(self) -> None:
         newest = self.capture.newest
         motions = self.capture.drain()
-        live = self.state.live
+        live, shaking = self.state.live, self.state.shaking
         if newest.setup is not None:
             live = live_history.extended(live, newest.setup, motions)
-        self.state = replace(self.state, newest=newest, live=live)
+            sensors = len(newest.setup.layout.sensors)
+            if shaking is None or shaking.q_world_sensor.shape[1] != sensors:
+                shaking = shaken.begin(sensors)
+            shaking = shaken.heeded(shaking, motions)
+        self.state = replace(self.state, newest=newest, live=live, shaking=shaking)
         for report in self.capture.reports():
             if isinstance(report, TakeDone):
                 self._take_done(report.path)
             else:
+                self._sound(Sound.ALARM)
                 self._say(report)
                 self.refresh_takes()
 
@@ -322,6 +479,8 @@ class Studio:
             self._pending.remove(done)
             try:
                 self._use(done, done.future.result())
+            except Stopped as stopped:
+                self._tell(" ".join(words.in_words(stopped)))
             except HandstudioError as error:
                 self._say(error)
             except Exception as error:  # the job's process may have been killed
@@ -344,8 +503,9 @@ class Studio:
                     self._show(reviewing.opened(take, motion))
             case _SendFile(page=page) if isinstance(result, Path):
                 self._tell(_("Exported {path}.").format(path=result))
-                downloads = (*self.state.downloads, Download(page, result))
-                self.state = replace(self.state, downloads=downloads)
+                self._send_file(Download(page, result.name, result))
+            case _SendDiagnostics(page=page) if isinstance(result, bytes):
+                self._send_file(Download(page, "handstudio-diagnostics.zip", result))
             case _:
                 pass
 
@@ -367,9 +527,40 @@ class Studio:
         along = so3.rotate(q_world_forearm, np.array([0.0, 1.0, 0.0]))
         self.state = replace(self.state, yaw=_FORWARD - float(np.arctan2(along[1], along[0])))
 
+    # --- settings -------------------------------------------------------------------------------
+
+    def _change(self, **values: Any) -> None:
+        self.store.put(msgspec.structs.replace(self.store.settings, **values), self._now_s)
+        self.state = replace(self.state, settings=self.store.settings)
+
+    def _keep_settings(self, elapsed_s: float) -> None:
+        self._now_s += elapsed_s
+        self.store.tick(self._now_s)
+        notice = self.store.take_notice()
+        if notice is not None:
+            self._say(notice)
+
+    # --- telling --------------------------------------------------------------------------------
+
+    def _speak(self, languages: tuple[str, ...]) -> None:
+        """The language that was chosen, else that of the newest page, else the system's."""
+        chosen = self.language or words.spoken([self.store.settings.language])
+        language = chosen or words.spoken(languages) or words.system_language()
+        if language != self.state.language or not languages:
+            words.use_language(language)
+        self.state = replace(self.state, language=language)
+
+    def _sound(self, sound: Sound) -> None:
+        if self.store.settings.sounds:
+            self.state = replace(self.state, sounds=(*self.state.sounds, sound))
+
+    def _send_file(self, download: Download) -> None:
+        self.state = replace(self.state, downloads=(*self.state.downloads, download))
+
     def _tell(self, text: str) -> None:
         self.state = replace(self.state, messages=(*self.state.messages, Message(text)))
 
     def _say(self, error: HandstudioError) -> None:
-        message = Message(error.what, error.remedy, alarm=True)
+        what, remedy = words.in_words(error)
+        message = Message(what, remedy, alarm=True)
         self.state = replace(self.state, messages=(*self.state.messages, message))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -23,6 +24,7 @@ from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.health.record import TakeHealth
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
@@ -31,37 +33,62 @@ from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
+from handstudio.recording.take_health import health_of_take
+from handstudio.settings import load_settings, settings_path
 from handstudio.setup import HandModel, filter_named
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 CONNECT_S = 25.0
+
+TOKEN_VARIABLE = "HANDSTUDIO_TOKEN"
+"""Environment variable with the token that visitors of the page need."""
 
 
 def studio(
     *,
     virtual: bool = False,
     connect: str | None = None,
+    host: str = "127.0.0.1",
     port: int = 8765,
+    token: str | None = None,
     sessions: Sessions = None,
     browser: bool = True,
     language: Literal["en", "ja"] | None = None,
 ) -> int:
-    """Open the studio in the browser.
+    """Open the studio in the browser, for this machine only unless told otherwise.
 
     Args:
         virtual: Begin with the virtual glove.
         connect: Begin with this device (serial:/dev/ttyACM0, tcp:HOST:PORT, replay:TAKE.mcap).
+        host: Serve there: 0.0.0.0 for the whole network, or an address of this machine. Visitors
+            then need the link that is shown (docs/lan.md).
         port: Port of the page; the next free one is taken where this is in use.
+        token: What the link must hold, 16 characters or more; one is made for any host but
+            loopback. Others on this machine see arguments: HANDSTUDIO_TOKEN is the better way.
         sessions: Folder of the takes.
         browser: Open the page in the browser.
-        language: English or Japanese; the system's unless given.
+        language: English or Japanese; unless given the one chosen on the page before, else the
+            browser's, else the system's.
     """
     from app import words  # noqa: PLC0415 - the page's libraries only where it is wanted
-    from app.__main__ import run  # noqa: PLC0415
+    from app.__main__ import Options, run  # noqa: PLC0415
+    from app.door import guard  # noqa: PLC0415
 
     address = connect or ("virtual:" if virtual else None)
     words.use_language(language)
-    return run(library.sessions_folder(sessions), address=address, port=port, browser=browser)
+    from_environment = os.environ.pop(TOKEN_VARIABLE, None)  # what we start need not have it
+    chosen = token if token is not None else from_environment or None
+    return run(
+        Options(
+            library.sessions_folder(sessions),
+            address=address,
+            port=port,
+            browser=browser,
+            host=host,
+            token=None if chosen is None else guard.checked_token(chosen),
+            language=language,
+        )
+    )
 
 
 def devices(*, json: Json = False) -> int:
@@ -122,14 +149,16 @@ def record(
     return _tell_take(open_take(path), json)
 
 
-def info(take: TakeFile, *, json: Json = False) -> int:
-    """Say what a take holds.
+def info(take: TakeFile, *, health: bool = False, json: Json = False) -> int:
+    """Say what a take holds, and how its stream and sensors did.
 
     Args:
         take: The take.
+        health: Compute how stream and sensors did where it was not kept (recovered or older takes).
         json: Print JSON for a program instead of words.
     """
-    return _tell_take(open_take(take), json)
+    opened = open_take(take)
+    return _tell_take(opened, json, health_of_take(opened) if health else None)
 
 
 def process(
@@ -270,6 +299,44 @@ def simulate(
     return 0
 
 
+def diagnostics(*, output: Path | None = None, sessions: Sessions = None) -> int:
+    """Write a file for whoever helps when something does not work; it says nothing of subjects.
+
+    Args:
+        output: The zip to write; in the folder one is in unless given.
+        sessions: Folder of the takes.
+    """
+    from app import diagnostics as what  # noqa: PLC0415 - part of the studio
+
+    target = output or Path(what.zip_name(datetime.now().astimezone()))
+    folder = library.sessions_folder(sessions)
+    takes = library.entries(folder)
+    remembered = load_settings(settings_path()).settings
+    content = what.make(
+        Newest(),
+        settings=msgspec.to_builtins(remembered),
+        sessions=folder,
+        takes=takes,
+        names=(remembered.subject, remembered.take_name, remembered.visit),
+    )
+    try:
+        with target.open("xb") as file:
+            file.write(content)
+    except FileExistsError as error:
+        raise HandstudioError(
+            "{path} is there already.", "Choose another name: --output FILE.", path=target
+        ) from error
+    except OSError as error:
+        raise HandstudioError(
+            "{path}: cannot be written ({reason}).",
+            "Choose another place: --output FILE.",
+            path=target,
+            reason=error.strerror or error,
+        ) from error
+    out.print(str(target))
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "studio": studio,
     "devices": devices,
@@ -286,6 +353,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "restore": keeping.restore,
     "subjects": keeping.subjects,
     "delete-subject": keeping.delete_subject,
+    "diagnostics": diagnostics,
 }
 
 
@@ -385,17 +453,49 @@ def _raise_what_failed(capture: Capture) -> None:
         raise capture.newest.problem
 
 
-def _tell_take(take: Take, json: bool) -> int:
+def _tell_take(take: Take, json: bool, health: TakeHealth | None = None) -> int:
     header, summary = take.header, take.summary
+    if health is None and summary is not None:
+        health = summary.health
     if json:
-        print_json({"path": str(take.path), "header": header, "summary": summary})
+        told = {"path": str(take.path), "header": header, "summary": summary, "health": health}
+        print_json(told)
         return 0
     rows = [[key, value] for key, value in _facts(header).items()]
     if summary is not None:
         lost = f"{summary.missing} of {summary.packets + summary.missing} instants"
         rows += [["duration", f"{summary.duration_s:.2f} s"], ["lost", lost]]
+    if health is not None:
+        rows += [[key, value] for key, value in _health_facts(health, header).items()]
     print_table(str(take.path), ["", ""], rows)
     return 0
+
+
+def _health_facts(health: TakeHealth, header: Header) -> dict[str, str]:
+    facts = {}
+    if health.measured_rate_hz is not None:
+        facts["measured rate"] = f"{health.measured_rate_hz:.2f} Hz"
+    if health.jitter_p95_ms is not None:
+        facts["jitter"] = f"95 % of the chunks within {health.jitter_p95_ms:.1f} ms"
+    for name, latency in (("latency", health.latency), ("to the page and back", health.page)):
+        if latency is not None:
+            facts[name] = (
+                f"50 % {latency.p50_ms:.1f} ms, 99 % {latency.p99_ms:.1f} ms, "
+                f"longest {latency.max_ms:.1f} ms"
+            )
+    facts["damaged, dropped by device, restarts"] = (
+        f"{health.damaged}, {health.dropped_by_device}, {health.restarts}"
+    )
+    names = header.setup.layout.names
+    for trouble in health.troubles:
+        where = ", ".join(names[sensor] for sensor in trouble.sensors)
+        facts[trouble.kind] = (
+            f"{where + ': ' if where else ''}{trouble.times} times, {trouble.seconds:.1f} s, "
+            f"worst {trouble.worst:.3g} {trouble.unit}"
+        )
+    if health.episodes_not_kept:
+        facts["not listed"] = f"{health.episodes_not_kept} more of these"
+    return facts
 
 
 def _facts(header: Header) -> dict[str, str]:

@@ -46,7 +46,7 @@ class Settings(msgspec.Struct, frozen=True):
         language: ``en``, ``ja``, ...; empty: the system's.
         theme: Of the page.
         last_address: The device that was connected last.
-        subject: Code of the person, as last recorded.
+        subject: Code of the person, as last recorded; empty: nobody yet.
         take_name: What takes are called.
         visit: Name of the visit; empty: the day.
         countdown_s: How long to count down before a recording begins.
@@ -61,7 +61,7 @@ class Settings(msgspec.Struct, frozen=True):
     language: str = ""
     theme: Literal["dark", "light"] = "dark"
     last_address: str = ""
-    subject: str = "S01"
+    subject: str = ""
     take_name: str = "take"
     visit: str = ""
     countdown_s: float = 3.0

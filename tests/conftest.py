@@ -47,6 +47,15 @@ def settings_of_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def log_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """No test writes into the log of the person who runs it; where those of the tests are."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("log")
+        patch.setenv("HANDSTUDIO_LOG", str(folder))
+        yield folder
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The folder of recordings of real sensors (they are not part of the project)."""

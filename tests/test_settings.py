@@ -123,7 +123,7 @@ def test_a_file_that_cannot_be_read_stays_where_it_is(file):
         ("theme", "pink", "dark"),
         ("side", "both", "right"),
         ("language", "../../etc", ""),
-        ("subject", 5, "S01"),
+        ("subject", 5, ""),
         ("take_name", "x" * 501, "take"),
         ("shown", {"skin": 1}, Shown()),
         ("shown", [], Shown()),

@@ -15,3 +15,13 @@ def put(handle: Any, **values: Any) -> None:
     for name, value in values.items():
         if getattr(handle, name) != value:
             setattr(handle, name, value)
+
+
+def typed(use: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Only what a person typed or chose counts, not what the studio wrote into the field."""
+    return lambda event: use(event.target.value) if event.client is not None else None
+
+
+def page_of(event: Any) -> int:
+    """The page an event came from; -1: from none."""
+    return int(event.client.client_id) if event.client is not None else -1

@@ -6,32 +6,35 @@ import viser
 
 from app import intents
 from app.panels.base import Send, put
-from app.studio import State
+from app.state import State
 from app.words import _
+from handstudio.device.find import VIRTUAL, Found
 from handstudio.device.orders import Phase
 
 
 class DevicePanel:
     """Choose a device and see what it says of itself."""
 
-    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+    def __init__(self, gui: viser.GuiApi, send: Send, state: State) -> None:
         self._send = send
         self._addresses: dict[str, str] = {}
+        self._wanted = state.settings.last_address  # to be shown as chosen once it is found
         self._choice = gui.add_dropdown(
             _("Device"), (_("Virtual glove (showcase)"),), hint=_("Devices that were found")
         )
         self._address = gui.add_text(
             _("or address"),
-            "",
+            self._wanted if self._wanted.startswith(("tcp:", "replay:")) else "",
             hint=_("serial:/dev/ttyACM0, tcp:HOST:PORT or replay:TAKE.mcap"),
         )
         self._connect = gui.add_button(_("Connect"), icon=viser.Icon.PLUG_CONNECTED)
-        self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH)
+        self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH, color="gray")
         self._facts = gui.add_markdown("")
         self._blink_choice = gui.add_dropdown(_("Sensor"), ("SN1",), visible=False)
         self._blink = gui.add_button(
             _("Blink this sensor"),
             icon=viser.Icon.BULB,
+            color="gray",
             hint=_("Its light on the glove blinks for three seconds"),
             visible=False,
         )
@@ -42,10 +45,11 @@ class DevicePanel:
 
     def render(self, state: State) -> None:
         """Show devices and what the present one says of itself."""
-        labels = {found.label: found.address for found in state.devices}
+        labels = {_label(found): found.address for found in state.devices}
         if labels != self._addresses:
             self._addresses = labels
             self._choice.options = tuple(labels)
+            self._choose_the_last()
         newest = state.newest
         self._connected = newest.phase in (Phase.CONNECTING, Phase.STREAMING, Phase.LOST)
         put(self._connect, label=_("Disconnect") if self._connected else _("Connect"))
@@ -54,6 +58,13 @@ class DevicePanel:
         looking = _("Looking …") if state.searching else _("Look for devices")
         put(self._find, label=looking, disabled=state.searching)
         self._render_facts(state)
+
+    def _choose_the_last(self) -> None:
+        """The device of the time before, where it is there; once, as choosing is the person's."""
+        for label, address in self._addresses.items():
+            if address == self._wanted:
+                self._wanted = ""
+                put(self._choice, value=label)
 
     def _toggle(self) -> None:
         if self._connected:
@@ -74,12 +85,15 @@ class DevicePanel:
                 self._blink_choice.options = names
 
 
+def _label(found: Found) -> str:
+    return _("Virtual glove (showcase)") if found == VIRTUAL else found.label
+
+
 def _facts(state: State) -> str:
     newest = state.newest
     description = newest.description
     if description is None:
         return ""
-    health = newest.health
     side = {"left": _("left hand"), "right": _("right hand")}.get(
         description.side, _("side not told")
     )
@@ -87,11 +101,5 @@ def _facts(state: State) -> str:
         (description.name, f"{description.serial_number}, {side}"),
         (_("Firmware"), description.firmware),
         (_("Sensors"), f"{len(description.sensors)} @ {description.rate_hz} Hz"),
-        (_("Lost, damaged"), f"{health.missing}, {health.damaged}"),
-        (_("Dropped by device"), f"{health.dropped_by_device}"),
     ]
-    if health.drift_ppm is not None:
-        rows.append((_("Clock drift"), f"{health.drift_ppm:+.0f} ppm"))
-    if health.celsius is not None:
-        rows.append((_("Warmest sensor"), f"{health.celsius:.0f} °C"))
     return "\n".join(["| | |", "|---|---|", *(f"| {key} | {value} |" for key, value in rows)])

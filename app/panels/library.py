@@ -1,4 +1,4 @@
-"""Review: the takes, and what to make of the one that is open."""
+"""Review: finding takes, and what to make of the one that is chosen or open."""
 
 from __future__ import annotations
 
@@ -9,21 +9,26 @@ from typing import Any
 import viser
 
 from app import intents
-from app.panels.base import Send, put
-from app.studio import State
-from app.view import clock_of
-from app.words import _
+from app.panels.base import Send, page_of, put, typed
+from app.panels.sheets import ask_deletion, ask_emptying
+from app.review import Review
+from app.state import Shelf, State
+from app.views.recording import clock_of
+from app.words import _, in_words
 from handstudio.export.csv import Content
 from handstudio.recording.library import Entry
 
 
 class LibraryPanel:
-    """Open a take, export it."""
+    """Search, open, recover and export takes."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._send = send
         self._labels: dict[str, Entry] = {}
         self._entries: tuple[Entry, ...] | None = None
+        self._search = gui.add_text(
+            _("Search"), "", hint=_("Words of name, subject, visit, notes or marks")
+        )
         self._choice = gui.add_dropdown(_("Take"), (_("Choose a take"),))
         self._facts = gui.add_markdown("")
         self._recover = gui.add_button(
@@ -32,43 +37,58 @@ class LibraryPanel:
         self._csv = gui.add_button(
             _("Export CSV"), icon=viser.Icon.DOWNLOAD, hint=_("Joint angles; key: E"), visible=False
         )
-        self._more = gui.add_dropdown(
-            _("Contents"), ("angles", "orientations", "positions"), visible=False
-        )
+        self._contents = _contents(hand=True)
+        self._more = gui.add_dropdown(_("Contents"), tuple(self._contents), visible=False)
+        self._notes = NotesFolder(gui, send)
+        self._shelf = ShelfFolder(gui, send, self._selected)
         self._opened: Path | None = None
-        self._choice.on_update(self._chosen)
+        self._search.on_update(typed(lambda text: send(intents.Search(text))))
+        self._choice.on_update(typed(self._chosen))
         self._recover.on_click(lambda _event: self._ask_recovery())
         self._csv.on_click(self.export)
 
     def render(self, state: State) -> None:
         """Show the library and the open take."""
-        if state.takes is not self._entries:
-            self._entries = state.takes
-            self._labels = {_label(entry, state.sessions): entry for entry in state.takes}
-            self._choice.options = (_("Choose a take"), *self._labels)
         review = state.review
+        if state.shelf.found is not self._entries:
+            self._entries = state.shelf.found
+            self._labels = {_label(entry): entry for entry in state.shelf.found}
+            options = (_("Choose a take"), *self._labels)
+            if self._choice.options != options:
+                self._choice.options = options
+                self._opened = None
         self._follow(review.take.path if review else None)
         put(self._csv, visible=review is not None)
         put(self._more, visible=review is not None)
         put(self._facts, content=self._words(state))
         entry = self._labels.get(self._choice.value)
-        interrupted = entry is not None and entry.take is None
+        interrupted = entry is not None and entry.take is None and not entry.recording
         put(self._recover, visible=interrupted and review is None)
         if review is not None:
-            contents = _contents(review.setup.layout.is_hand)
-            if self._more.options != contents:
-                self._more.options = contents
+            self._contents = _contents(review.setup.layout.is_hand)
+            if self._more.options != tuple(self._contents):
+                self._more.options = tuple(self._contents)
+        self._notes.render(review)
+        self._shelf.render(state)
 
     def export(self, event: Any) -> None:
         """Send the open take's file to the page that asked."""
-        page = event.client.client_id if event.client is not None else -1
-        content: Content = self._more.value  # type: ignore[assignment]
-        self._send(intents.Export(content, page))
+        content = self._contents.get(self._more.value, "orientations")
+        self._send(intents.Export(content, page_of(event)))
 
-    def _chosen(self, event: Any) -> None:
+    def bin(self) -> None:
+        """The chosen take goes to the bin."""
+        self._shelf.bin()
+
+    def _selected(self) -> Path | None:
+        """The file that is chosen in the list, open or not."""
         entry = self._labels.get(self._choice.value)
+        return entry.path if entry is not None else self._opened
+
+    def _chosen(self, label: str) -> None:
+        entry = self._labels.get(label)
         # an interrupted recording has nothing to open: the words and the button below speak of it
-        if event.client is not None and entry is not None and entry.take is not None:
+        if entry is not None and entry.take is not None:
             self._send(intents.OpenTake(entry.path))
 
     def _ask_recovery(self) -> None:
@@ -85,34 +105,179 @@ class LibraryPanel:
         put(self._choice, value=shown[0] if shown else _("Choose a take"))
 
     def _words(self, state: State) -> str:
-        review = state.review
+        if state.review is not None:
+            return _facts(state.review)
+        entry = self._labels.get(self._choice.value)
+        if entry is not None and entry.recording:
+            return _("This take is being recorded.")
+        if entry is not None and entry.error is not None:
+            return in_words(entry.error)[0] + "\n\n" + _("What was saved can be had back.")
+        return _shelf_words(state.shelf)
+
+
+class NotesFolder:
+    """What a person adds to the open take: words, names of stretches, marks."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._folder = gui.add_folder(_("Notes"), expand_by_default=False, visible=False)
+        with self._folder:
+            self._text = gui.add_text(_("Notes"), "", multiline=True)
+            self._list = gui.add_markdown("")
+            self._label = gui.add_text(
+                _("Name of the part"), "", hint=_("What happens between begin and end")
+            )
+            self._name = gui.add_button(_("Name this part"), color="gray")
+            self._mark = gui.add_dropdown(_("Mark"), ("",), visible=False)
+            self._remove = gui.add_button(_("Remove this mark"), color="gray", visible=False)
+        self._marks: dict[str, float] = {}
+        self._written = ""
+        self._of: Path | None = None
+        self._text.on_update(typed(lambda text: send(intents.SetNotes(text))))
+        self._name.on_click(lambda _event: send(intents.NamePart(self._label.value)))
+        self._mark.on_update(typed(lambda text: send(intents.Seek(self._marks.get(text, 0.0)))))
+        self._remove.on_click(
+            lambda _event: send(intents.RemoveMark(self._marks.get(self._mark.value, -1.0)))
+        )
+
+    def render(self, review: Review | None) -> None:
+        """Show the notes of the open take."""
+        put(self._folder, visible=review is not None)
         if review is None:
-            entry = self._labels.get(self._choice.value)
-            if entry is not None and entry.take is None:
-                return entry.problem + "\n\n" + _("What was saved can be had back.")
-            return "" if self._labels else _("No takes yet: record one.")
-        header, summary = review.take.header, review.take.summary
-        start = datetime.fromtimestamp(header.start_utc_ns * 1e-9).astimezone()
-        counts = _("{instants} instants, {lost} lost").format(
-            instants=len(review.time_s), lost=summary.missing if summary else "?"
+            return
+        notes = review.notes
+        # written only where they changed by themselves: else words just typed would be overwritten
+        if (review.take.path, notes.text) != (self._of, self._written):
+            if self._of != review.take.path:
+                put(self._text, value=notes.text)
+            self._of, self._written = review.take.path, notes.text
+        stretches = [
+            f"- {label.label}: {clock_of(label.start_s)} – {clock_of(label.end_s)}"
+            for label in notes.labels
+        ]
+        put(self._list, content="\n".join(stretches))
+        self._marks = {
+            f"{clock_of(mark.at_s)} {mark.text}".strip(): mark.at_s for mark in notes.marks
+        }
+        options = tuple(self._marks) or ("",)
+        if self._mark.options != options:
+            self._mark.options = options
+        put(self._mark, visible=bool(self._marks))
+        put(self._remove, visible=bool(self._marks))
+
+
+class ShelfFolder:
+    """Keeping the library tidy: names, the bin, subjects; and taking it back."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send, selected: Any) -> None:
+        self._send = send
+        self._state: State | None = None
+        with gui.add_folder(_("Keep tidy"), expand_by_default=False):
+            self._name = gui.add_text(_("New name"), "")
+            self._rename = gui.add_button(_("Rename the take"), color="gray")
+            self._bin = gui.add_button(
+                _("Move to the bin"), icon=viser.Icon.TRASH, color="gray", hint=_("Key: Delete")
+            )
+            self._undo = gui.add_button(_("Undo"), icon=viser.Icon.ARROW_BACK_UP, color="gray")
+            self._binned = gui.add_dropdown(_("In the bin"), ("",), visible=False)
+            self._restore = gui.add_button(_("Put it back"), color="gray", visible=False)
+            self._empty = gui.add_button(_("Empty the bin"), color="gray", visible=False)
+            self._delete = gui.add_button(
+                _("Delete a subject"), icon=viser.Icon.USER_X, color="gray", visible=False
+            )
+        self._selected = selected
+        self._keys: dict[str, str] = {}
+        self._rename.on_click(lambda _event: self._ask_rename())
+        self._bin.on_click(lambda _event: self.bin())
+        self._undo.on_click(lambda _event: send(intents.Undo()))
+        self._restore.on_click(lambda _event: self._put_back())
+        self._empty.on_click(self._ask_emptying)
+        self._delete.on_click(self._ask_deletion)
+
+    def render(self, state: State) -> None:
+        """Show what can be done."""
+        self._state = state
+        chosen = self._selected() is not None
+        put(self._rename, disabled=not chosen)
+        put(self._bin, disabled=not chosen)
+        undo = state.shelf.undo
+        label = _("Undo: {what}").format(what=undo) if undo else _("Nothing to undo")
+        put(self._undo, label=label, disabled=not undo)
+        binned = state.shelf.binned
+        self._keys = {f"{one.name} · {one.subject} · {one.visit}": one.key for one in binned}
+        options = tuple(self._keys) or ("",)
+        if self._binned.options != options:
+            self._binned.options = options
+        for handle in (self._binned, self._restore, self._empty):
+            put(handle, visible=bool(binned))
+        empty = _("Empty the bin ({count} takes)").format(count=len(binned))
+        put(self._empty, label=empty)
+        put(self._delete, visible=bool(state.shelf.subjects))
+
+    def bin(self) -> None:
+        """The chosen take goes to the bin."""
+        path = self._selected()
+        if path is not None:
+            self._send(intents.BinTake(path))
+
+    def _ask_rename(self) -> None:
+        path = self._selected()
+        if path is not None and self._name.value.strip():
+            self._send(intents.RenameTake(path, self._name.value))
+
+    def _put_back(self) -> None:
+        key = self._keys.get(self._binned.value)
+        if key is not None:
+            self._send(intents.RestoreTake(key))
+
+    def _ask_emptying(self, event: Any) -> None:
+        if event.client is not None:
+            ask_emptying(event.client, self._send, len(self._keys))
+
+    def _ask_deletion(self, event: Any) -> None:
+        if event.client is not None and self._state is not None:
+            ask_deletion(event.client, self._send, self._state)
+
+
+def _shelf_words(shelf: Shelf) -> str:
+    if not shelf.takes:
+        return _("No takes yet: record one.")
+    if not shelf.found:
+        return _("No take has all these words.")
+    if shelf.search.strip():
+        return _("{found} of {all} takes").format(found=len(shelf.found), all=len(shelf.takes))
+    return _("{all} takes").format(all=len(shelf.takes))
+
+
+def _facts(review: Review) -> str:
+    header, summary = review.take.header, review.take.summary
+    start = datetime.fromtimestamp(header.start_utc_ns * 1e-9).astimezone()
+    counts = _("{instants} instants, {lost} lost").format(
+        instants=len(review.time_s), lost=summary.missing if summary else "?"
+    )
+    zero = _("Zero of angles: {zero}").format(zero=_zero(header.setup.zero))
+    return (
+        f"**{review.take.path.stem}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
+        f"{clock_of(review.duration_s)} · {counts}\n\n{zero}"
+    )
+
+
+def _zero(zero: str) -> str:
+    """What angles are measured from, in the page's language; files keep the English."""
+    known = {
+        "nominal mounting: sensor axes taken as segment axes": _(
+            "nominal mounting: sensor axes taken as segment axes"
         )
-        zero = _("Zero of angles: {zero}").format(zero=header.setup.zero)
-        return (
-            f"**{review.take.path.stem}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
-            f"{clock_of(review.duration_s)} · {counts}\n\n{zero}"
-        )
+    }
+    return known.get(zero, zero)
 
 
-def _contents(hand: bool) -> tuple[str, ...]:
-    return ("angles", "orientations", "positions") if hand else ("orientations",)
+def _contents(hand: bool) -> dict[str, Content]:
+    contents: dict[str, Content] = {_("Joint angles"): "angles", _("Orientations"): "orientations"}
+    if hand:
+        return {**contents, _("Positions"): "positions"}
+    return {_("Orientations"): "orientations"}
 
 
-def _label(entry: Entry, sessions: Path) -> str:
-    try:
-        place = entry.path.relative_to(sessions)
-    except ValueError:
-        place = entry.path
-    subject, visit = (*place.parts[:2], "", "")[:2]
-    name = place.name.removesuffix(".mcap")
-    mark = " ⚠" if entry.take is None else ""
-    return f"{name} · {subject} · {visit}{mark}"
+def _label(entry: Entry) -> str:
+    mark = " ●" if entry.recording else " ⚠" if entry.take is None else ""
+    return f"{entry.name} · {entry.subject} · {entry.visit}{mark}"

@@ -10,7 +10,8 @@ from viser import uplot
 
 from app import colours
 from app.channels import Plot
-from app.view import Curves
+from app.panels.base import put
+from app.views.page import Curves
 from app.words import _
 from handstudio.arrays import Array
 
@@ -26,6 +27,8 @@ class PlotsPanel:
         self._gui = gui
         self._panel = gui.add_panel()
         self._tab = self._panel.add_tab(_("Angles"), viser.Icon.CHART_LINE)
+        with self._panel.add_tab(_("Health"), viser.Icon.HEARTBEAT):
+            self._health = gui.add_html("")
         self._panel.dock_right()
         self._panel.set_width(400.0)
         if narrow:
@@ -33,13 +36,15 @@ class PlotsPanel:
         with self._tab:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
+        self._dark = True
         self._heads: list[viser.GuiHtmlHandle] = []
         self._handles: list[viser.GuiUplotHandle] = []
 
-    def render(self, curves: Curves | None) -> None:
+    def render(self, curves: Curves | None, dark: bool) -> None:
         """Show curves, or that there are none."""
         plots = curves.plots if curves is not None else ()
-        if plots != self._plots:
+        if (plots, dark) != (self._plots, self._dark):
+            self._dark = dark
             self._build(plots)
         if curves is None:
             return
@@ -49,6 +54,14 @@ class PlotsPanel:
             handle.data = _data(curves, curves.values[:, first:last])
             first = last
 
+    def render_health(self, content: str) -> None:
+        """Show how stream and sensors do."""
+        put(self._health, content=content)
+
+    def remove(self) -> None:
+        """Take the panel off its page."""
+        self._panel.remove()
+
     def _build(self, plots: tuple[Plot, ...]) -> None:
         for handle in (*self._heads, *self._handles):
             handle.remove()
@@ -57,12 +70,12 @@ class PlotsPanel:
         self._empty.visible = not plots
         with self._tab:
             for plot in plots:
-                self._heads.append(self._gui.add_html(_head(plot)))
+                self._heads.append(self._gui.add_html(_head(plot, self._dark)))
                 self._handles.append(self._add(plot))
 
     def _add(self, plot: Plot) -> viser.GuiUplotHandle:
         curves = tuple(
-            uplot.Series(label=curve.label, stroke=colours.css(curve.colour), width=1.5)
+            uplot.Series(label=curve.label, stroke=colours.css(curve.colour, self._dark), width=1.5)
             for curve in plot.curves
         )
         playhead = uplot.Series(label=_("now"), stroke="#8a909a", width=1)
@@ -80,10 +93,10 @@ class PlotsPanel:
         )
 
 
-def _head(plot: Plot) -> str:
+def _head(plot: Plot, dark: bool) -> str:
     """Title, unit and which colour is what, in one line above the plot."""
     labels = " ".join(
-        f'<span style="color:{colours.css(curve.colour)};white-space:nowrap">'
+        f'<span style="color:{colours.css(curve.colour, dark)};white-space:nowrap">'
         f"&#9632; {html.escape(curve.label)}</span>"
         for curve in plot.curves
     )

@@ -7,10 +7,11 @@ from typing import Any
 import viser
 
 from app import intents
-from app.panels.base import Send, put
-from app.review import SPEEDS
-from app.studio import State
-from app.view import clock_of
+from app.panels.base import Send, put, typed
+from app.review import SPEEDS, Review
+from app.state import State
+from app.views import timeline
+from app.views.recording import clock_of
 from app.words import _
 
 _STEP_S = 0.01
@@ -21,11 +22,14 @@ class TransportPanel:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = gui.add_panel(visible=False)
-        with self._panel.add_tab(_("Replay")):
+        with self._panel.add_tab(_("Replay"), viser.Icon.TIMELINE):
+            self._strip = gui.add_html("")
             self._time = gui.add_slider(_("Time [s]"), 0.0, 1.0, _STEP_S, 0.0)
             self._clock = gui.add_markdown("")
-            self._play = gui.add_button(
-                _("Play"), icon=viser.Icon.PLAYER_PLAY, hint=_("Key: space")
+            self._moves = gui.add_button_group(
+                _("Move"),
+                ("−10", "−1", _("Play"), "+1", "+10"),
+                hint=_("Instants back and on: arrow keys; play: space"),
             )
             labels = tuple(f"{speed:g}x" for speed in SPEEDS)
             self._speed = gui.add_dropdown(_("Speed"), labels, initial_value="1x")
@@ -34,28 +38,33 @@ class TransportPanel:
                 (_("Begin here"), _("End here"), _("Whole")),
                 hint=_("The part that is played and exported; keys: I, O, W"),
             )
+            self._marks = gui.add_button_group(
+                _("Marks"),
+                (_("Before"), _("Mark here"), _("Next")),
+                hint=_("Keys: J, M, K"),
+            )
             self._loop = gui.add_checkbox(_("Loop"), initial_value=False)
-            self._live = gui.add_button(_("Back to the live hand"), icon=viser.Icon.HAND_STOP)
-        self._panel.float(x=16.0, y=-16.0, width=400.0, height=290.0)
+            self._live = gui.add_button(
+                _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color="gray"
+            )
+        self._panel.float(x=16.0, y=-16.0, width=440.0, height=330.0)
         self._playing = False
         self._written = 0.0
-        self._time.on_update(
-            lambda event: send(intents.Seek(event.target.value)) if event.client else None
-        )
-        self._play.on_click(lambda _event: send(intents.TogglePlay()))
+        self._time.on_update(typed(lambda at_s: send(intents.Seek(at_s))))
+        self._moves.on_click(lambda event: self._moved(event, send))
         self._live.on_click(lambda _event: send(intents.ShowLive()))
-        self._speed.on_update(lambda event: _set_speed(event, send))
-        self._loop.on_update(
-            lambda event: send(intents.SetLoop(event.target.value)) if event.client else None
+        self._speed.on_update(typed(lambda text: send(intents.SetSpeed(float(text.rstrip("x"))))))
+        self._loop.on_update(typed(lambda on: send(intents.SetLoop(on))))
+        _on_choice(self._window, send, (intents.MarkIn(), intents.MarkOut(), intents.WholeTake()))
+        _on_choice(
+            self._marks,
+            send,
+            (
+                intents.GoToMark(forward=False),
+                intents.PutMark(),
+                intents.GoToMark(forward=True),
+            ),
         )
-        parts: dict[str, intents.Intent] = dict(
-            zip(
-                self._window.options,
-                (intents.MarkIn(), intents.MarkOut(), intents.WholeTake()),
-                strict=True,
-            )
-        )
-        self._window.on_click(lambda event: send(parts[event.target.value]))
 
     def render(self, state: State) -> None:
         """Show where in the take we are."""
@@ -63,6 +72,17 @@ class TransportPanel:
         put(self._panel, visible=review is not None)
         if review is None:
             return
+        self._render_time(review)
+        put(self._strip, content=timeline.as_svg(review))
+        put(self._clock, content=_here(review))
+        if review.playing != self._playing:
+            self._playing = review.playing
+            middle = _("Pause") if review.playing else _("Play")
+            self._moves.options = ("−10", "−1", middle, "+1", "+10")
+        put(self._speed, value=f"{review.speed:g}x")
+        put(self._loop, value=review.loop)
+
+    def _render_time(self, review: Review) -> None:
         end = max(review.duration_s, _STEP_S)
         if self._time.max != end:
             self._written = 0.0
@@ -75,21 +95,24 @@ class TransportPanel:
         if at != self._written:
             self._written = at
             put(self._time, value=at)
-        here = f"{clock_of(review.at_s)} / {clock_of(review.duration_s)}"
-        if review.in_s > 0.0 or review.out_s is not None:
-            here += " · " + _("part {begin} to {end}").format(
-                begin=clock_of(review.in_s), end=clock_of(review.end_s)
-            )
-        put(self._clock, content=here)
-        if review.playing != self._playing:
-            self._playing = review.playing
-            put(self._play, label=_("Pause") if review.playing else _("Play"))
-            icon = viser.Icon.PLAYER_PAUSE if review.playing else viser.Icon.PLAYER_PLAY
-            self._play.icon = icon
-        put(self._speed, value=f"{review.speed:g}x")
-        put(self._loop, value=review.loop)
+
+    def _moved(self, event: Any, send: Send) -> None:
+        steps = {"−10": -10, "−1": -1, "+1": 1, "+10": 10}
+        instants = steps.get(event.target.value)
+        send(intents.TogglePlay() if instants is None else intents.Step(instants))
 
 
-def _set_speed(event: Any, send: Send) -> None:
-    if event.client is not None:
-        send(intents.SetSpeed(float(event.target.value.removesuffix("x"))))
+def _here(review: Review) -> str:
+    here = f"**{clock_of(review.at_s)}** / {clock_of(review.duration_s)}"
+    if review.in_s > 0.0 or review.out_s is not None:
+        here += " · " + _("part {begin} to {end}").format(
+            begin=clock_of(review.in_s), end=clock_of(review.end_s)
+        )
+    return here
+
+
+def _on_choice(
+    group: viser.GuiButtonGroupHandle, send: Send, choices: tuple[intents.Intent, ...]
+) -> None:
+    by_words = dict(zip(group.options, choices, strict=True))
+    group.on_click(lambda event: send(by_words[event.target.value]))

@@ -1,7 +1,8 @@
 """Addresses of devices, and opening them.
 
 ========================  =========================================================
-``serial:/dev/ttyACM0``   a serial port (``serial:COM5`` on Windows)
+``serial:/dev/ttyACM0``   a serial port (``serial:COM5`` on Windows); ``?baud=115200`` behind it
+                          is for adapters, USB devices need none
 ``tcp:host:port``         a device on a socket
 ``virtual:``              a virtual glove of one's own, started and ended with us
 ``replay:FILE.mcap``      the bytes of a take, at their own pace (tests and demos)

@@ -19,14 +19,15 @@ import msgspec
 
 from handstudio import pipeline
 from handstudio.device.addresses import open_source
-from handstudio.device.health import HealthCount
+from handstudio.device.health import HealthKeeper
 from handstudio.device.host_clock import now_ns
-from handstudio.device.line import READ_S, Line
+from handstudio.device.line import READ_S, Line, stranger
 from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
     Newest,
+    NotePage,
     Order,
     Phase,
     Report,
@@ -47,7 +48,7 @@ from handstudio.protocol.packets import (
     Reply,
     Restart,
 )
-from handstudio.recording.header import Header, Summary
+from handstudio.recording.header import Header
 from handstudio.recording.take import FirstState, pack_first_state
 from handstudio.samples import Ranges
 from handstudio.setup import HandModel, Setup, for_device
@@ -59,13 +60,7 @@ SILENCE_S = 0.5  # without motion for so long a streaming device counts as lost
 REOPEN_S = 2.0  # a line without a byte is opened anew after this
 RETRY_S = 0.25  # between attempts to reach a lost device
 INTRODUCTION_S = 4.0  # a device that has not described itself by then is not one of ours
-HEALTH_S = 0.1  # between two times the figures are renewed: they cost as much as a filter step
 HISTORY = 2000  # motions kept for `drain`
-
-_NO_GLOVE = (
-    "Choose another port, switch the glove on, or choose the decoder it needs "
-    "(handstudio/protocol/MAKERS.md)."
-)
 
 
 @dataclass
@@ -90,9 +85,7 @@ class Capture:
         self._line: Line | None = None
         self._stream = EventStream("handstudio-1", None)
         self._state: pipeline.State | None = None
-        self._count = HealthCount()
-        self._at_start = HealthCount()  # counts when the take began
-        self._health_due = 0.0
+        self._health = HealthKeeper()
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
 
     # --- doors, for any thread ------------------------------------------------------------------
@@ -166,6 +159,8 @@ class Capture:
                 self._start_take(order)
             case StopTake():
                 self._stop_take()
+            case NotePage(ms=ms):
+                self._health.note_page(ms)
             case Ask():
                 self._pass_on(order)
 
@@ -176,7 +171,7 @@ class Capture:
 
     def _connect(self, order: Connect) -> None:
         self.newest = Newest(Phase.CONNECTING, order.address)
-        self._state, self._count = None, HealthCount()
+        self._state, self._health = None, HealthKeeper()
         try:
             self._stream = EventStream(order.decoder, None)
         except HandstudioError as error:
@@ -267,7 +262,7 @@ class Capture:
         return SILENCE_S if setup is None else max(SILENCE_S, 3.0 / setup.rate_hz)
 
     def _refuse(self, line: Line) -> None:
-        self._give_up(_no_glove(self.newest.address, line.received))
+        self._give_up(stranger(line, self.newest.address, INTRODUCTION_S))
 
     def _find_out(self, chunk: bytes, arrival_ns: int, line: Line) -> None:
         """Nothing enters a take or the pipeline before it is known from whom it is."""
@@ -285,14 +280,14 @@ class Capture:
         if line is not self._line:
             return
         recorder = self.newest.recorder
-        if recorder is not None:
-            recorder.put(arrival_ns, chunk)
+        if recorder is not None and not recorder.put(arrival_ns, chunk):
+            self._stop_take()  # before what is not in it is counted as if it were
         packets, events = self._stream.feed(chunk, arrival_ns)
-        self._count.note(packets, arrival_ns)
         if self.newest.setup is not None and self._state is not None:
             motion, self._state = pipeline.run(self.newest.setup, self._state, events)
             if len(motion):
                 self._publish(motion, arrival_ns, line)
+        self._health.note(packets, events, arrival_ns)  # after the pose: nobody waits for it
         for packet in packets:
             self._heed(packet, line)
 
@@ -301,14 +296,14 @@ class Capture:
         if self.newest.recorder is not None:
             self.newest.recorder.put_motion(motion)
         self._history.append(motion)
-        published = now_ns()
-        self._count.note_latency((published - arrival_ns) * 1e-6)
-        health = self.newest.health
-        if line.moved >= self._health_due:
-            health = self._count.view(published)
-            self._health_due = line.moved + HEALTH_S
+        self._health.note_published(arrival_ns, now_ns())
         self.newest = replace(
-            self.newest, phase=Phase.STREAMING, motion=motion[-1:], health=health, problem=None
+            self.newest,
+            phase=Phase.STREAMING,
+            motion=motion[-1:],
+            health=self._health.view,
+            findings=self._health.findings,
+            problem=None,
         )
 
     def _heed(self, packet: Packet, line: Line) -> None:
@@ -354,6 +349,7 @@ class Capture:
             self._stream.ranges = Ranges.of(description)
             self._state = pipeline.begin(setup)
             self._history.clear()
+            self._health.meet(setup)
         self.newest = replace(self.newest, description=description, setup=setup, problem=None)
         if first:
             line.moved = time.monotonic()
@@ -382,8 +378,9 @@ class Capture:
             )
 
     def _show_lost(self) -> None:
-        health = replace(self._count.view(now_ns()), rate_hz=0.0)
-        self.newest = replace(self.newest, phase=Phase.LOST, health=health)
+        self._health.renew(now_ns())
+        health = replace(self._health.view, rate_hz=0.0)
+        self.newest = replace(self.newest, phase=Phase.LOST, health=health, findings=())
 
     def _give_up(self, error: HandstudioError) -> None:
         self._close()
@@ -447,29 +444,17 @@ class Capture:
         except HandstudioError as error:
             self._reports.append(error)
             return
-        self._at_start = replace(self._count)
+        self._health.begin_take()
         self.newest = replace(self.newest, recorder=recorder)
 
     def _stop_take(self) -> None:
         recorder = self.newest.recorder
         if recorder is None:
             return
-        recorder.stop(self._summary(recorder))  # it closes the file by itself: the line goes on
+        # it closes the file by itself: the line goes on
+        recorder.stop(self._health.summary(recorder.seconds, now_ns()))
         self._closing.append(recorder)
         self.newest = replace(self.newest, recorder=None)
-
-    def _summary(self, recorder: Recorder) -> Summary:
-        health = self._count.view(now_ns())
-        return Summary(
-            chunks=recorder.chunks,
-            bytes=recorder.bytes,
-            duration_s=recorder.seconds,
-            packets=health.packets - self._at_start.packets,
-            missing=health.missing - self._at_start.missing,
-            damaged=health.damaged - self._at_start.damaged,
-            clock_offset_ns=health.offset_ns,
-            clock_drift_ppm=health.drift_ppm,
-        )
 
     def _collect(self) -> None:
         """Report takes that were closed; stop one whose file can no longer be written."""
@@ -479,23 +464,6 @@ class Capture:
         for done in [recorder for recorder in self._closing if recorder.finished]:
             self._closing.remove(done)
             self._reports.append(done.failure or TakeDone(done.path))
-
-
-def _no_glove(address: str, received: int) -> DeviceError:
-    if received == 0:
-        return DeviceError(
-            "{address} did not say that it is a glove: nothing came within {seconds:.0f} s.",
-            _NO_GLOVE,
-            address=address,
-            seconds=INTRODUCTION_S,
-        )
-    return DeviceError(
-        "{address} did not say that it is a glove: {received} bytes came within {seconds:.0f} s.",
-        _NO_GLOVE,
-        address=address,
-        received=received,
-        seconds=INTRODUCTION_S,
-    )
 
 
 def _take_waits(mine: str, other: str) -> DeviceError:

@@ -73,7 +73,10 @@ def _ask(line: Line, address: str) -> Found:
                     return Found(address, address, problem=f"speaks protocol version {version}")
                 case _:
                     pass
-    return Found(address, address, problem="does not say that it is a glove")
+    problem = "does not say that it is a glove"
+    if line.babbles:
+        problem += f": {line.received} bytes came, none of the protocol; the baud rate may be wrong"
+    return Found(address, address, problem=problem)
 
 
 def _is_bluetooth(device: str, description: str | None) -> bool:

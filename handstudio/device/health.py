@@ -1,126 +1,70 @@
-"""What a stream tells of itself, counted as it passes."""
+"""The health of the device that is connected, as the capture thread keeps it."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 
-import numpy as np
+from handstudio.health.findings import Finding
+from handstudio.health.view import HealthView
+from handstudio.health.watch import Watch
+from handstudio.protocol.packets import Packet
+from handstudio.recording.header import Summary
+from handstudio.samples import Event
+from handstudio.setup import Setup
 
-from handstudio.device.clock import ClockEstimate
-from handstudio.protocol.packets import (
-    Corruption,
-    Health,
-    ImuPacket,
-    Missing,
-    Packet,
-    Restart,
-    Temperature,
-)
+__all__ = ["HealthKeeper", "HealthView"]
 
-_SPAN_NS = 2_000_000_000
+HEALTH_S = 0.1
+"""Between two times the figures are renewed: they cost as much as a filter step."""
 
 
-@dataclass(frozen=True, slots=True)
-class HealthView:
-    """Figures of a stream at one moment."""
+class HealthKeeper:
+    """A watch and its newest view, renewed now and then; owned by the capture thread."""
 
-    rate_hz: float = 0.0
-    packets: int = 0
-    missing: int = 0
-    damaged: int = 0
-    restarts: int = 0
-    dropped_by_device: int = 0
-    latency_p99_ms: float = 0.0  # from a chunk's arrival to its published pose, last 2 s
-    delay_ms: float = 0.0  # how much later than the least delayed the newest chunk came
-    drift_ppm: float | None = None
-    offset_ns: int | None = None
-    silent: tuple[int, ...] = ()  # sensors that did not answer the newest instant
-    celsius: float | None = None  # the warmest sensor
+    def __init__(self) -> None:
+        self.view = HealthView()
+        self.findings: tuple[Finding, ...] = ()
+        self._watch = Watch()
+        self._due_ns = 0
 
-    @property
-    def loss_percent(self) -> float:
-        """Share of the instants that were lost."""
-        whole = self.packets + self.missing
-        return 100.0 * self.missing / whole if whole else 0.0
+    def meet(self, setup: Setup) -> None:
+        """It is known what the device is, or that it is another than before."""
+        self._watch.begin(setup)
 
+    def note(self, packets: Iterable[Packet], events: Sequence[Event], arrival_ns: int) -> None:
+        """A chunk came at host time ``arrival_ns``."""
+        self._watch.note(packets, events, arrival_ns)
 
-@dataclass
-class HealthCount:
-    """Counts of one stream; owned by the capture thread."""
+    def note_published(self, arrival_ns: int, now_ns: int) -> None:
+        """What came then was published now; renews the view when it is time."""
+        self._watch.note_latency((now_ns - arrival_ns) * 1e-6)
+        if now_ns >= self._due_ns:
+            self.renew(now_ns)
 
-    packets: int = 0
-    missing: int = 0
-    damaged: int = 0
-    restarts: int = 0
-    dropped_by_device: int = 0
-    celsius: float | None = None
-    silent: tuple[int, ...] = ()
-    delay_ms: float = 0.0
-    clock: ClockEstimate = field(default_factory=ClockEstimate)
-    _arrivals: deque[tuple[int, int]] = field(default_factory=deque)  # arrival ns, instants
-    _latencies: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
+    def renew(self, now_ns: int) -> None:
+        """Renew the view."""
+        self.view, self.findings = self._watch.view(now_ns), self._watch.findings
+        self._due_ns = now_ns + round(HEALTH_S * 1e9)
 
-    def note(self, packets: Iterable[Packet], arrival_ns: int) -> None:
-        """Count the packets of a chunk."""
-        newest: ImuPacket | None = None
-        instants = 0
-        for packet in packets:
-            match packet:
-                case ImuPacket():
-                    newest, instants = packet, instants + 1
-                case Missing(count=count):
-                    self.missing += count
-                case Corruption():
-                    self.damaged += 1
-                case Restart():
-                    self.restarts += 1
-                    self.clock.restart()
-                case Health(dropped=dropped):
-                    self.dropped_by_device = dropped
-                case Temperature(celsius=celsius) if np.isfinite(celsius).any():
-                    self.celsius = float(np.nanmax(celsius))
-                case _:
-                    pass
-        self.packets += instants
-        if newest is not None:
-            self._note_newest(newest, instants, arrival_ns)
+    def note_page(self, ms: float) -> None:
+        """The slowest page answered what it was sent after so long."""
+        self._watch.note_page(ms)
 
-    def note_latency(self, ms: float) -> None:
-        """A chunk was published this long after it came."""
-        self._latencies.append(ms)
+    def begin_take(self) -> None:
+        """From the next chunk on a take is recorded."""
+        self._watch.begin_take()
 
-    def view(self, now_ns: int) -> HealthView:
-        """The figures now."""
-        while self._arrivals and self._arrivals[0][0] < now_ns - _SPAN_NS:
-            self._arrivals.popleft()
-        return HealthView(
-            rate_hz=self._rate(),
-            packets=self.packets,
-            missing=self.missing,
-            damaged=self.damaged,
-            restarts=self.restarts,
-            dropped_by_device=self.dropped_by_device,
-            latency_p99_ms=float(np.percentile(self._latencies, 99)) if self._latencies else 0.0,
-            delay_ms=self.delay_ms,
-            drift_ppm=self.clock.drift_ppm,
-            offset_ns=self.clock.offset_ns(),
-            silent=self.silent,
-            celsius=self.celsius,
+    def summary(self, seconds: float, now_ns: int) -> Summary:
+        """The take ended; what is to be kept of it. The writer knows how much it wrote."""
+        view, health = self._watch.view(now_ns), self._watch.end_take()
+        return Summary(
+            chunks=0,
+            bytes=0,
+            duration_s=seconds,
+            packets=health.instants if health else 0,
+            missing=health.missing if health else 0,
+            damaged=health.damaged if health else 0,
+            clock_offset_ns=view.offset_ns,
+            clock_drift_ppm=view.drift_ppm,
+            health=health,
         )
-
-    def _note_newest(self, newest: ImuPacket, instants: int, arrival_ns: int) -> None:
-        self._arrivals.append((arrival_ns, instants))
-        self.clock.observe(newest.clock_us, arrival_ns)
-        self.delay_ms = self.clock.delay_ms(newest.clock_us, arrival_ns)
-        self.silent = tuple(int(i) for i in np.flatnonzero(~newest.answering))
-
-    def _rate(self) -> float:
-        """Instants a second over the last two seconds; 0 when they stopped."""
-        if len(self._arrivals) < 2:
-            return 0.0
-        span_ns = self._arrivals[-1][0] - self._arrivals[0][0]
-        # the instants of the first chunk lie before the span
-        counted = sum(count for _, count in self._arrivals) - self._arrivals[0][1]
-        return counted * 1e9 / span_ns if span_ns else 0.0

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 
 from handstudio.device.source import ByteSource
+from handstudio.errors import DeviceError
 from handstudio.protocol.codec import encode
 from handstudio.protocol.decoder import Decoder, decoder_named
 from handstudio.protocol.framing import DELIMITER
-from handstudio.protocol.packets import Command, Packet, Request
+from handstudio.protocol.packets import Command, Corruption, Packet, Request
 
 READ_S = 0.02
 """How long a read waits for the first byte, and so how soon an order is heard."""
@@ -21,6 +22,10 @@ BEHIND = 3000
 
 ASK_S = 0.5
 """Between two times of asking the same."""
+
+
+BABBLE = 16
+"""So many bytes hold a packet, or are none of the protocol's."""
 
 
 class Line:
@@ -36,11 +41,13 @@ class Line:
         heard: When the last byte came.
         moved: When the last motion came, or the device was met.
         received: Bytes so far.
+        understood: Among them were packets of the protocol, be they nothing to us.
     """
 
     def __init__(self, source: ByteSource, decoder: str) -> None:
         self.introduced = False
         self.received = 0
+        self.understood = False
         self.opened = self.heard = self.moved = time.monotonic()
         self._source = source
         self._decoder = decoder
@@ -92,7 +99,14 @@ class Line:
     def hold(self, arrival_ns: int, chunk: bytes) -> list[Packet]:
         """Keep what came before it is known from whom; what it says, for finding out."""
         self._held.append((arrival_ns, chunk))
-        return self._scout.feed(chunk)
+        packets = self._scout.feed(chunk)
+        self.understood |= any(not isinstance(packet, Corruption) for packet in packets)
+        return packets
+
+    @property
+    def babbles(self) -> bool:
+        """Bytes come, and none of them ever was part of a packet."""
+        return self.received >= BABBLE and not self.understood
 
     def release(self) -> list[tuple[int, bytes]]:
         """What was held, with its times of arrival; it is held no more."""
@@ -109,3 +123,34 @@ class Line:
     def close(self) -> None:
         """Let go; never raises."""
         self._source.close()
+
+
+def stranger(line: Line, address: str, waited_s: float) -> DeviceError:
+    """Who is there did not say that it is a glove."""
+    if line.received == 0:
+        return DeviceError(
+            "{address} did not say that it is a glove: nothing came within {seconds:.0f} s.",
+            "Switch the glove on, or choose another port.",
+            address=address,
+            seconds=waited_s,
+        )
+    if line.babbles and address.startswith("serial:"):
+        return DeviceError(
+            "{address} did not say that it is a glove: {bytes} bytes came within {seconds:.0f} s, "
+            "none of them of the protocol.",
+            "Choose another port. Where the glove is behind a UART adapter, the baud rate may be "
+            "wrong: add it to the address, {port}?baud=115200. A glove of another make needs its "
+            "decoder (handstudio/protocol/MAKERS.md).",
+            address=address,
+            bytes=line.received,
+            seconds=waited_s,
+            port=address.partition("?")[0],
+        )
+    return DeviceError(
+        "{address} did not say that it is a glove: {bytes} bytes came within {seconds:.0f} s.",
+        "Choose another port, switch the glove off and on, or choose the decoder it needs "
+        "(handstudio/protocol/MAKERS.md).",
+        address=address,
+        bytes=line.received,
+        seconds=waited_s,
+    )

@@ -10,6 +10,7 @@ from typing import TypeAlias
 from handstudio.device.health import HealthView
 from handstudio.device.recorder import Recorder
 from handstudio.errors import HandstudioError
+from handstudio.health.findings import Finding
 from handstudio.pipeline import Motion
 from handstudio.protocol.packets import Description, Reply
 from handstudio.setup import HandModel, Setup
@@ -68,7 +69,14 @@ class Ask:
     argument: bytes = b""
 
 
-Order: TypeAlias = Connect | Disconnect | SetHand | StartTake | StopTake | Ask
+@dataclass(frozen=True, slots=True)
+class NotePage:
+    """The slowest page answered what it was sent after so long [ms]; kept with the take."""
+
+    ms: float
+
+
+Order: TypeAlias = Connect | Disconnect | SetHand | StartTake | StopTake | Ask | NotePage
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +89,15 @@ class Newest:
     setup: Setup | None = None
     motion: Motion | None = None  # one instant
     health: HealthView = HealthView()
+    findings: tuple[Finding, ...] = ()  # what is wrong now, the worse first
     problem: HandstudioError | None = None
     recorder: Recorder | None = None
     last_reply: Reply | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether a take can begin: the device is known and there."""
+        return self.setup is not None and self.phase in (Phase.CONNECTING, Phase.STREAMING)
 
 
 @dataclass(frozen=True, slots=True)

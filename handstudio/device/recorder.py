@@ -54,8 +54,9 @@ class Recorder:
         self.header = header
         self.started = time.monotonic()
         self.failure: HandstudioError | None = None
-        self.bytes = 0  # these two by the capture thread alone
+        self.bytes = 0  # these three by the capture thread alone
         self.chunks = 0
+        self.first_us: int | None = None  # device time of the take's first instant
         self._written = 0  # bytes; by the writer thread alone
         self._queue: queue.SimpleQueue[_Chunk | Motion | _End] = queue.SimpleQueue()
         self._writer = TakeWriter(path, header, first_state)
@@ -68,10 +69,10 @@ class Recorder:
         """How long this recording has been going on."""
         return time.monotonic() - self.started
 
-    def put(self, arrival_ns: int, chunk: bytes) -> None:
-        """Hand over bytes; returns at once. After a failure nothing more enters the take."""
+    def put(self, arrival_ns: int, chunk: bytes) -> bool:
+        """Hand over bytes; returns at once. False: it failed, and these are not in the take."""
         if self.failure is not None:
-            return
+            return False
         waiting = self.bytes - self._written
         if waiting + len(chunk) > BACKLOG_LIMIT:
             self.failure = TakeError(
@@ -80,13 +81,16 @@ class Recorder:
                 path=self.path,
                 megabytes=waiting / 1e6,
             )
-            return
+            return False
         self.bytes += len(chunk)
         self.chunks += 1
         self._queue.put(_Chunk(arrival_ns, chunk))
+        return True
 
     def put_motion(self, motion: Motion) -> None:
         """Hand over the live result, so that the take opens at once."""
+        if self.first_us is None and len(motion):
+            self.first_us = int(motion.time_us[0])
         if self.failure is None:
             self._queue.put(motion)
 

@@ -45,7 +45,7 @@ class Line(Protocol):
         """Pass on what fits; how much that was [bytes]."""
 
     def wait(self, seconds: float) -> None:
-        """Return after that time, or earlier when there is something to read."""
+        """Return after that time, or earlier: with something to read, or with room again."""
 
     def close(self) -> None:
         """Leave nothing behind."""
@@ -147,6 +147,10 @@ def _stop_at_end_of_input(stop: threading.Event) -> None:
     stop.set()
 
 
+def _await(line: socket.socket | int, full: bool, seconds: float) -> None:
+    select.select([line], [line] if full else [], [], seconds)
+
+
 class TcpLine:
     """A port on this machine's own network; one host at a time."""
 
@@ -156,6 +160,7 @@ class TcpLine:
         self._door = socket.create_server(("127.0.0.1", port))
         self._door.setblocking(False)
         self._host: socket.socket | None = None
+        self._full = False
         self.address = f"tcp:127.0.0.1:{self._door.getsockname()[1]}"
 
     def read(self) -> bytes | None:
@@ -175,14 +180,18 @@ class TcpLine:
 
     def write(self, data: bytes) -> int:
         """Pass on what fits; nothing does while nobody is there."""
+        if self._host is None:
+            return 0
         try:
-            return 0 if self._host is None else self._host.send(data)
+            size = self._host.send(data)
         except (BlockingIOError, ConnectionError):
-            return 0  # reading tells whether the host is gone
+            size = 0  # reading tells whether the host is gone
+        self._full = size < len(data)
+        return size
 
     def wait(self, seconds: float) -> None:
-        """Return after that time, or earlier when there is something to read."""
-        select.select([self._host or self._door], [], [], seconds)
+        """Return after that time, or earlier: with something to read, or with room again."""
+        _await(self._host or self._door, self._full and self._host is not None, seconds)
 
     def close(self) -> None:
         """Hang up and free the port."""
@@ -215,6 +224,7 @@ if sys.platform != "win32":
             tty.setraw(self._hosts)
             os.set_blocking(self._ours, False)
             self._path = os.ttyname(self._hosts)
+            self._full = False
             self._link = link
             if link is not None:
                 self._name(link)
@@ -230,13 +240,15 @@ if sys.platform != "win32":
         def write(self, data: bytes) -> int:
             """Pass on what fits."""
             try:
-                return os.write(self._ours, data)
+                size = os.write(self._ours, data)
             except BlockingIOError:
-                return 0
+                size = 0
+            self._full = size < len(data)
+            return size
 
         def wait(self, seconds: float) -> None:
-            """Return after that time, or earlier when there is something to read."""
-            select.select([self._ours], [], [], seconds)
+            """Return after that time, or earlier: with something to read, or with room again."""
+            _await(self._ours, self._full, seconds)
 
         def close(self) -> None:
             """Close both ends and take the name away, if it still is ours."""

@@ -16,8 +16,8 @@ from handstudio.errors import DeviceError
 START_S = 20.0
 """How long a virtual glove may take to start on a busy machine."""
 
-_TX_BUFFER = 65536
-"""Of our own glove [bytes]: rides out 160 ms of a busy machine at 1000 Hz."""
+_TX_BUFFER = 1 << 18
+"""Of our own glove [bytes]: rides out 0.6 s at 1000 Hz of a machine that a browser keeps busy."""
 
 _OPTIONS = ("rate", "seed", "side", "hand-length", "name", "epoch")
 

@@ -9,9 +9,11 @@ import msgspec
 import numpy as np
 
 from handstudio import __version__
+from handstudio.health.record import TakeHealth, Trouble
 from handstudio.kinematics import has_start
 from handstudio.pipeline import Motion
 from handstudio.recording.take import Take
+from handstudio.recording.take_health import health_of_take
 from handstudio.setup import Setup
 
 CONVENTION = (
@@ -22,9 +24,9 @@ CONVENTION = (
 
 def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
     """The sidecar of an export, JSON."""
-    header, summary = take.header, take.summary
+    header = take.header
     start = datetime.fromtimestamp(header.start_utc_ns * 1e-9, UTC)
-    sent = (summary.packets + summary.missing) if summary else 0
+    health = health_of_take(take)
     fields: dict[str, Any] = {
         "content": content,
         "take": header.name,
@@ -35,7 +37,8 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
         "sensor_map": {place.sensor: place.segment for place in setup.layout.sensors},
         "nominal_rate_hz": setup.rate_hz,
         "measured_rate_hz": _measured_rate(motion),
-        "loss_percent": round(100.0 * summary.missing / sent, 4) if summary and sent else None,
+        "loss_percent": _loss_percent(take, health),
+        "findings": [_told(trouble, setup) for trouble in health.troubles],
         "calibration": setup.calibration,
         "zero": setup.zero,
         "convention": CONVENTION,
@@ -54,6 +57,30 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
     if content == "positions":
         fields["origin"] = "the elbow, assumed still: its place cannot be observed"
     return msgspec.json.format(msgspec.json.encode(fields))
+
+
+def _loss_percent(take: Take, health: TakeHealth) -> float | None:
+    """None of an import, which does not tell. What was known live comes first."""
+    if take.header.kind == "samples":
+        return None
+    summary = take.summary
+    if summary is not None and summary.packets:
+        lost, sent = summary.missing, summary.packets + summary.missing
+        return round(100.0 * lost / sent, 4)
+    return round(health.loss_percent, 4) if health.instants else None
+
+
+def _told(trouble: Trouble, setup: Setup) -> dict[str, Any]:
+    names = [setup.layout.names[sensor] for sensor in trouble.sensors]
+    return {
+        "kind": trouble.kind,
+        "level": trouble.level,
+        "sensors": names,
+        "times": trouble.times,
+        "seconds": trouble.seconds,
+        "worst": round(trouble.worst, 3),
+        "unit": trouble.unit,
+    }
 
 
 def _measured_rate(motion: Motion) -> float | None:

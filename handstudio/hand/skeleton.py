@@ -97,15 +97,21 @@ class Skeleton:
     t_distal_tip: Float[Array, "5 3"]
 
     @property
-    def length_m(self) -> Float[Array, " k"]:
-        """Length of each segment [m]: from its joint to the farthest joint or tip it carries."""
-        lengths = np.zeros(len(SEGMENTS))
+    def t_far_end(self) -> Float[Array, "k 3"]:
+        """The farthest joint or tip that each segment carries, in its frame [m]."""
+        ends = np.zeros((len(SEGMENTS), 3))
         for child, parent in enumerate(PARENTS):
-            if parent >= 0:
-                reach = float(np.linalg.norm(self.t_parent_joint[child]))
-                lengths[parent] = max(lengths[parent], reach)
+            joint = self.t_parent_joint[child]
+            if parent >= 0 and np.linalg.norm(joint) > np.linalg.norm(ends[parent]):
+                ends[parent] = joint
         for tip, segment in zip(self.t_distal_tip, DISTALS, strict=True):
-            lengths[SEGMENTS.index(segment)] = np.linalg.norm(tip)
+            ends[SEGMENTS.index(segment)] = tip
+        return ends
+
+    @property
+    def length_m(self) -> Float[Array, " k"]:
+        """Length of each segment [m]: from its joint to its far end."""
+        lengths: Array = np.linalg.norm(self.t_far_end, axis=-1)
         return lengths
 
 

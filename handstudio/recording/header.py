@@ -9,6 +9,7 @@ import msgspec
 
 from handstudio import __version__
 from handstudio.errors import LayoutError, TakeError
+from handstudio.health.record import TakeHealth
 from handstudio.setup import Setup
 
 PROFILE = "handstudio"
@@ -55,6 +56,7 @@ class Summary(msgspec.Struct, frozen=True):
     damaged: int = 0
     clock_offset_ns: int | None = None  # host minus device clock, at the end
     clock_drift_ppm: float | None = None
+    health: TakeHealth | None = None  # also absent in takes of before it was kept
 
 
 def encode_header(header: Header, first_state: bytes) -> dict[str, str]:

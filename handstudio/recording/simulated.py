@@ -12,18 +12,20 @@ import numpy as np
 
 from handstudio.errors import SetupError
 from handstudio.hand.skeleton import HandSide, nominal_skeleton
+from handstudio.health.record import TakeHealth
+from handstudio.health.watch import Watch
 from handstudio.layout import glove
 from handstudio.protocol.codec import encode
-from handstudio.protocol.decoder import V1Decoder
 from handstudio.protocol.packets import Command, ImuPacket, Request
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.library import new_take_path
 from handstudio.recording.writer import TakeWriter
-from handstudio.setup import HandModel, for_device
+from handstudio.setup import HandModel, Setup, for_device
 from handstudio.simulation.firmware import RATES_HZ, Firmware
 from handstudio.simulation.glove import WornGlove, description
 from handstudio.simulation.rig import signals
 from handstudio.simulation.showcase import showcase
+from handstudio.stream import EventStream
 
 _STEP_US = 50_000  # of the glove's time in one chunk
 _ROOM = 1 << 24  # bytes: an offline line drops nothing
@@ -56,8 +58,9 @@ def simulate(
     worn = WornGlove(side, seed, hand.hand_length_m)
     writer = TakeWriter(path, Header(path.stem, subject, start_ns, setup, "wire", "simulated"))
     try:
-        clocks = _write(writer, Firmware(told, worn.read, _ROOM), seconds, start_ns)
-        writer.close(Summary(writer.chunks, writer.bytes, seconds, packets=len(clocks)))
+        clocks, health = _write(writer, Firmware(told, worn.read, _ROOM), setup, seconds, start_ns)
+        count = len(clocks)
+        writer.close(Summary(writer.chunks, writer.bytes, seconds, packets=count, health=health))
     finally:
         writer.abandon()
     _save_truth(path, side, hand.hand_length_m, clocks)
@@ -84,19 +87,25 @@ def _refuse(seconds: float, rate_hz: int) -> None:
         )
 
 
-def _write(writer: TakeWriter, glove: Firmware, seconds: float, start_ns: int) -> np.ndarray:
-    """Let the glove perform; returns the device clock of every instant [µs]."""
-    decoder, clocks = V1Decoder(), list[int]()
+def _write(
+    writer: TakeWriter, glove: Firmware, setup: Setup, seconds: float, start_ns: int
+) -> tuple[np.ndarray, TakeHealth | None]:
+    """Let the glove perform; returns the device clock of every instant [µs], and the health."""
+    stream, clocks, watch = EventStream("handstudio-1", setup.ranges), list[int](), Watch()
+    watch.begin(setup)
+    watch.begin_take()
     glove.receive(encode(Request(Command.START, 0)))
     for now_us in range(0, round(seconds * 1e6) + 1, _STEP_US):
         glove.advance(now_us)
         chunk = bytes(glove.outgoing)
         glove.taken(len(chunk))
         if chunk:
-            writer.write(start_ns + now_us * 1000, chunk)
-            packets = decoder.feed(chunk)
+            arrival_ns = start_ns + now_us * 1000
+            writer.write(arrival_ns, chunk)
+            packets, events = stream.feed(chunk, arrival_ns)
+            watch.note(packets, events, arrival_ns)
             clocks += [packet.clock_us for packet in packets if isinstance(packet, ImuPacket)]
-    return np.array(clocks, dtype=np.int64)
+    return np.array(clocks, dtype=np.int64), watch.end_take()
 
 
 def _save_truth(path: Path, side: HandSide, hand_length_m: float, clocks: np.ndarray) -> None:

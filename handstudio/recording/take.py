@@ -18,6 +18,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
 from handstudio.errors import TakeError
+from handstudio.protocol.packets import Packet
 from handstudio.recording.header import (
     HEADER_RECORD,
     PROFILE,
@@ -98,6 +99,16 @@ class Take:
         stream = self._stream(from_start)
         for arrival_ns, chunk in self.chunks():
             yield stream.feed(chunk, arrival_ns)[1]
+
+    def decoded(self) -> Iterator[tuple[int | None, list[Packet], list[Event]]]:
+        """Arrival [ns UTC], packets and events of every chunk; an import has events alone."""
+        if self.header.kind == "samples":
+            for _, data in self.chunks():
+                yield None, [], [decode_samples(data)]
+            return
+        stream = self._stream(from_start=False)
+        for arrival_ns, chunk in self.chunks():
+            yield arrival_ns, *stream.feed(chunk, arrival_ns)
 
     def sha256(self) -> str:
         """Hash of the raw file."""

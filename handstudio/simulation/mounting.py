@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.errors import LayoutError
-from handstudio.hand.skeleton import DISTALS, PARENTS, SEGMENTS, Skeleton
+from handstudio.hand.skeleton import SEGMENTS, Skeleton
 from handstudio.layout import Layout
 from handstudio.maths import so3
 
@@ -37,7 +37,7 @@ def nominal_mounting(layout: Layout, skeleton: Skeleton) -> Mounting:
     Raises:
         LayoutError: a sensor sits on something that is not a segment of the hand.
     """
-    far = _far_ends(skeleton)
+    far = skeleton.t_far_end
     places = []
     for place, segment in zip(layout.sensors, segment_indices(layout), strict=True):
         height = np.array([0.0, 0.0, _height_m(place.segment)])
@@ -61,18 +61,6 @@ def segment_indices(layout: Layout) -> list[int]:
                 segments=", ".join(SEGMENTS),
             )
     return [SEGMENTS.index(place.segment) for place in layout.sensors]
-
-
-def _far_ends(skeleton: Skeleton) -> Array:
-    """The farthest joint or tip that each segment carries, in its frame [m]."""
-    ends = np.zeros((len(SEGMENTS), 3))
-    for child, parent in enumerate(PARENTS):
-        joint = skeleton.t_parent_joint[child]
-        if parent >= 0 and np.linalg.norm(joint) > np.linalg.norm(ends[parent]):
-            ends[parent] = joint
-    for tip, segment in zip(skeleton.t_distal_tip, DISTALS, strict=True):
-        ends[SEGMENTS.index(segment)] = tip
-    return ends
 
 
 def _height_m(segment: str) -> float:

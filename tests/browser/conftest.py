@@ -39,6 +39,7 @@ class RunningStudio:
     url: str
     sessions: Path
     process: subprocess.Popen[str]
+    link: str = ""  # as it was told, with the token where one is needed
 
     @property
     def port(self) -> int:
@@ -53,8 +54,12 @@ def start_studio(tmp_path: Path) -> Iterator[Start]:
     """Start studios; they are ended, and must end well, when the test does."""
     running: list[RunningStudio] = []
 
-    def start(*arguments: str, sessions: Path | None = None) -> RunningStudio:
-        studio = _start(sessions or tmp_path / "sessions", *arguments)
+    def start(
+        *arguments: str, sessions: Path | None = None, language: str | None = "en"
+    ) -> RunningStudio:
+        spoken = ["--language", language] if language is not None else []
+        places = sessions or tmp_path / "sessions", tmp_path / "settings.json"
+        studio = _start(*places, *spoken, *arguments)
         running.append(studio)
         return studio
 
@@ -80,9 +85,11 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
     errors: list[str] = []
     contexts = []
 
-    def open_page(studio: RunningStudio, width: int = 1440, height: int = 900) -> Page:
+    def open_page(
+        studio: RunningStudio, width: int = 1440, height: int = 900, language: str = "en-US"
+    ) -> Page:
         context = browser.new_context(
-            viewport={"width": width, "height": height}, accept_downloads=True
+            viewport={"width": width, "height": height}, accept_downloads=True, locale=language
         )
         contexts.append(context)
         page = context.new_page()
@@ -94,6 +101,18 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
     for context in contexts:
         context.close()
     assert errors == []
+
+
+@pytest.fixture
+def tiny_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk with room for almost nothing."""
+    place = tmp_path / "tiny"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=45m", "tmpfs", str(place)]
+    if shutil.which("mount") is None or subprocess.run(mount, check=False).returncode != 0:
+        pytest.skip("only root can make a disk that is small")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
 
 
 def free_port() -> int:
@@ -120,19 +139,21 @@ def glove(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         process.stdout.close()
 
 
-def _start(sessions: Path, *arguments: str) -> RunningStudio:
-    command = [*COMMAND, "studio", "--language", "en", "--no-browser", "--port", str(free_port())]
+def _start(sessions: Path, settings: Path, *arguments: str) -> RunningStudio:
+    command = [*COMMAND, "studio", "--no-browser", "--port", str(free_port())]
     process = subprocess.Popen(
         [*command, "--sessions", str(sessions), *arguments],
+        env={**os.environ, "HANDSTUDIO_SETTINGS": str(settings)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
     assert process.stdout is not None
     for line in process.stdout:
-        found = re.search(r"http://localhost:\d+", line)
+        found = re.search(r"http://[^\s/]+:(\d+)\S*", line)
         if found:
-            return RunningStudio(found.group(), sessions, process)
+            url = f"http://localhost:{found[1]}"
+            return RunningStudio(url, sessions, process, found[0])
     raise AssertionError("the studio ended before it served")
 
 

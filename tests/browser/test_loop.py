@@ -10,63 +10,13 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-import PIL.Image
 import pytest
-from playwright.sync_api import Locator, Page, expect
-
-from app.view import clock_of
+from playwright.sync_api import Page, expect
 
 from .conftest import COMMAND, RunningStudio, Start
+from .page import button, moves_within, record, scrub_to, settles_within
 
 pytestmark = pytest.mark.browser
-
-CENTRE = {"x": 340, "y": 240, "width": 650, "height": 390}  # between notices and transport
-
-
-def look(page: Page) -> np.ndarray:
-    """The centre of the page as pixels."""
-    shot = page.screenshot(clip=CENTRE)  # type: ignore[arg-type]
-    return np.asarray(PIL.Image.open(io.BytesIO(shot)).convert("RGB"), dtype=float)
-
-
-def changed(before: np.ndarray, after: np.ndarray) -> float:
-    """Share of the pixels that clearly differ."""
-    return float((np.abs(before - after).max(axis=-1) > 40).mean())
-
-
-def moves_within(page: Page, seconds: float) -> bool:
-    """Whether the picture changes clearly in that time."""
-    before = look(page)
-    for _ in range(int(seconds * 2)):
-        page.wait_for_timeout(500)
-        if changed(before, look(page)) > 0.01:
-            return True
-    return False
-
-
-def settles_within(page: Page, seconds: float) -> bool:
-    """Whether the picture comes to rest in that time."""
-    before = look(page)
-    for _ in range(int(seconds)):
-        page.wait_for_timeout(1000)
-        now = look(page)
-        if changed(before, now) < 0.001:
-            return True
-        before = now
-    return False
-
-
-def button(page: Page, name: str) -> Locator:
-    return page.get_by_role("button", name=name, exact=True)
-
-
-def record(page: Page, seconds: float) -> None:
-    button(page, "Record").click()
-    expect(button(page, "Stop")).to_be_visible()
-    page.wait_for_timeout(seconds * 1000)
-    button(page, "Stop").click()
-    expect(page.get_by_text("Replay ·")).to_be_visible()
 
 
 def test_the_live_hand_moves(start_studio: Start, visit: Callable[..., Page]) -> None:
@@ -99,22 +49,6 @@ def test_a_take_is_recorded_replayed_and_exported(
         button(page, "Export CSV").click()
     downloaded = Path(waiting.value.path()).read_bytes()
     assert_same_as_the_shell_computes(studio, take, downloaded, tmp_path / "alone")
-
-
-def scrub_to(page: Page, at_s: float) -> None:
-    """Type a time of the take; the clock follows."""
-    numbers = [
-        field
-        for field in page.locator("input:visible").all()
-        if re.fullmatch(r"\d+(\.\d+)?", field.input_value())
-    ]
-    field = numbers[-1]  # the slider's own: the transport comes last on the page
-    # the page's number field passes over the first input after its value was set from outside
-    for text in (f"{at_s + 1.0}", f"{at_s}"):
-        field.fill(text)
-        field.press("Enter")
-        page.wait_for_timeout(300)
-    expect(page.get_by_text(f"{clock_of(at_s)} / ")).to_be_visible()
 
 
 def assert_same_as_the_shell_computes(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import signal
 import time
 from collections.abc import Callable
@@ -17,7 +16,7 @@ from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .test_loop import button, moves_within, scrub_to
+from .page import begin_recording, button, choose, end_recording, moves_within, scrub_to
 
 pytestmark = pytest.mark.browser
 
@@ -51,8 +50,7 @@ def test_a_lost_device_is_shown_and_the_take_goes_on(
         studio = start_studio("--connect", f"tcp:127.0.0.1:{port}")
         page = visit(studio)
         expect(page.get_by_text("Connected")).to_be_visible()
-        button(page, "Record").click()
-        expect(button(page, "Stop")).to_be_visible()
+        begin_recording(page)
         page.wait_for_timeout(1500)
         first.kill()
         died = time.monotonic()
@@ -62,10 +60,9 @@ def test_a_lost_device_is_shown_and_the_take_goes_on(
         assert time.monotonic() - died < 8.0
         expect(page.get_by_text("The take goes on")).to_be_visible()
     with glove(port, "--seed", "3"):
-        expect(page.get_by_text("Recording")).to_be_visible()
+        expect(page.get_by_text("Recording").first).to_be_visible()
         page.wait_for_timeout(1500)
-        button(page, "Stop").click()
-        expect(page.get_by_text("Replay ·")).to_be_visible()
+        end_recording(page)
     takes = list(studio.sessions.glob("*/*/*.mcap"))
     assert len(takes) == 1
     summary = open_take(takes[0]).summary
@@ -80,8 +77,7 @@ def test_ctrl_c_while_recording_keeps_the_take(
     studio = start_studio("--virtual")
     page = visit(studio)
     expect(page.get_by_text("Connected")).to_be_visible()
-    button(page, "Record").click()
-    expect(button(page, "Stop")).to_be_visible()
+    begin_recording(page)
     page.wait_for_timeout(1500)
     page.close()  # a closed page ends nothing
     time.sleep(1.0)
@@ -152,12 +148,6 @@ def test_real_recordings_are_replayed(
         button(page, "Play").click()
         assert moves_within(page, 10.0)
         button(page, "Pause").click()
-
-
-def choose(page: Page, name: str) -> None:
-    """Pick a take in the list."""
-    page.get_by_role("combobox", name="Take").click()
-    page.get_by_role("option", name=re.compile(name)).first.click()
 
 
 def write_hinge(folder: Path) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -24,9 +25,11 @@ from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Order, Phase, Report, StartTake, StopTake
 from handstudio.device.orders import TakeDone as Done
 from handstudio.device.virtual_glove import Line, TcpLine, serve
+from handstudio.health.findings import Kind
 from handstudio.pipeline import Motion, join
 from handstudio.process import kept_motion, process
 from handstudio.recording.take import Take, open_take
+from handstudio.recording.take_health import recomputed_health
 from handstudio.simulation.firmware import Firmware
 from handstudio.simulation.glove import WornGlove, description
 
@@ -428,8 +431,17 @@ class Studio:
         return open_take(path)
 
     def check(self, take: Take) -> Motion:
-        """Live, kept and computed motion of a take are equal to the last bit; that motion."""
+        """Live, kept and computed motion of a take are equal to the last bit; that motion.
+
+        So is its health, but for how long the poses took.
+        """
         self.hear()
+        assert take.summary is not None
+        assert take.summary.health is not None
+        live = take.summary.health
+        episodes = tuple(one for one in live.episodes if one.kind != Kind.LATE.value)
+        unseen = msgspec.structs.replace(live, latency=None, episodes=episodes)
+        assert recomputed_health(take) == unseen
         kept = kept_motion(take)
         assert kept is not None, "the live motion was not kept"
         kept = Motion(*(np.array(getattr(kept, name)) for name in _FIELDS))

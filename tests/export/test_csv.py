@@ -8,6 +8,7 @@ import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pyarrow.csv
 import pytest
@@ -18,6 +19,7 @@ from handstudio.export import csv as csv_module
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.angles import ROOT_ANGLES
 from handstudio.hand.skeleton import FINGERS, JOINTS
+from handstudio.health.record import Episode
 from handstudio.kinematics import angles_of, measured_angles, pose_of, relative_rotations
 from handstudio.layout import JointPlace, Layout, SensorPlace
 from handstudio.pipeline import Motion
@@ -241,6 +243,7 @@ def test_every_export_says_where_it_is_from(recorded, motion, tmp_path, content)
     ]
     assert told["nominal_rate_hz"] == told["measured_rate_hz"] == 100.0
     assert told["loss_percent"] == 0.0
+    assert told["findings"] == []
     assert told["calibration"] == header.setup.calibration
     assert told["zero"] == header.setup.zero
     assert "flexion (about x), deviation (about z), rotation (about y)" in told["convention"]
@@ -264,6 +267,39 @@ def test_loss_and_measured_rate_are_what_they_were(recorded, motion, tmp_path):
     told = json.loads(sidecar(tmp_path))
     assert told["loss_percent"] == 2.5
     assert (told["nominal_rate_hz"], told["measured_rate_hz"]) == (100.0, 50.0)
+
+
+def test_what_was_wrong_goes_along(recorded, motion, tmp_path):
+    wrong = (
+        Episode("magnetic", "note", (16,), 1.0, 2.5, 20.0),
+        Episode("magnetic", "act", (14, 16), 4.0, 5.0, 44.4444),
+        Episode("loss", "note", (), 0.0, 0.25, 0.5),
+    )
+    health = msgspec.structs.replace(recorded.summary.health, episodes=wrong)
+    summary = msgspec.structs.replace(recorded.summary, chunks=0, bytes=0, health=health)
+    spoilt = open_take(TakeWriter(tmp_path / "spoilt.mcap", recorded.header).close(summary))
+    exported(spoilt, motion, tmp_path)
+    told = json.loads(sidecar(tmp_path))
+    assert told["findings"] == [
+        {
+            "kind": "magnetic",
+            "level": "act",
+            "sensors": ["SN15", "SN17"],
+            "times": 2,
+            "seconds": 2.5,
+            "worst": 44.444,
+            "unit": "%",
+        },
+        {
+            "kind": "loss",
+            "level": "note",
+            "sensors": [],
+            "times": 1,
+            "seconds": 0.25,
+            "worst": 0.5,
+            "unit": "%",
+        },
+    ]
 
 
 def test_what_nobody_knows_is_null(door, tmp_path):

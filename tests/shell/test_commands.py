@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -108,8 +109,22 @@ def test_a_recording_is_a_take_of_the_library_and_of_that_length(handstudio, rec
 def test_a_take_is_described_for_persons(here, recorded):
     said = here("info", recorded)
     assert said.code == 0
-    for fact in ("P07", "171 mm", "100 Hz", "VG-7", "SN17"):
+    for fact in ("P07", "171 mm", "100 Hz", "VG-7", "SN17", "100.00 Hz", "latency", "jitter"):
         assert fact in said.out
+
+
+def test_how_a_take_did_is_told_and_computed_where_it_was_not_kept(here, recorded, tmp_path):
+    kept = here("info", recorded, "--json").json["health"]
+    assert kept["latency"]["p99_ms"] > 0.0
+    assert len(kept["sensors"]) == 20
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(recorded.read_bytes()[:-500])
+    back = here("recover", torn, "--json").json["path"]
+    assert here("info", back, "--json").json["health"] is None
+    computed = here("info", back, "--health", "--json").json["health"]
+    assert computed["latency"] is None
+    assert computed["measured_rate_hz"] == kept["measured_rate_hz"]
+    assert "restarts" in here("info", back, "--health").out
 
 
 def test_processing_writes_the_csv_that_exporting_writes(handstudio, take, tmp_path):
@@ -341,3 +356,57 @@ def test_a_reader_that_goes_away_is_no_mistake(recorded):
         ["sh", "-c", f"{command} | true"], capture_output=True, text=True, check=False
     )
     assert "Traceback" not in done.stderr
+
+
+# --- the studio and what helps with it ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what", "remedy"),
+    [
+        (["--token", "too-short"], "16 to 128", "one is made for you"),
+        (["--host", "192.0.2.99"], "192.0.2.99: this machine cannot serve there", "0.0.0.0"),
+        (["--host", "no-such.invalid"], "no machine of this name", "0.0.0.0"),
+        (["--port", "70000"], "not the number of a port", "1024 to 65535"),
+    ],
+)
+def test_where_nothing_can_be_served_it_is_said_at_once(
+    handstudio, tmp_path, arguments, what, remedy
+):
+    said = handstudio("studio", "--no-browser", "--sessions", tmp_path, *arguments)
+    assert said.code == 1
+    assert what in said.err
+    assert remedy in said.err
+    assert "too-short" not in said.out + said.err
+
+
+def test_diagnostics_are_written_and_never_over_another_file(here, tmp_path):
+    target = tmp_path / "help.zip"
+    said = here("diagnostics", "--output", target, "--sessions", tmp_path / "sessions")
+    assert said.code == 0, said.err
+    assert said.out.strip() == str(target)
+    assert "README.txt" in zipfile.ZipFile(target).namelist()
+    before = target.read_bytes()
+    said = here("diagnostics", "--output", target)
+    assert said.code == 1
+    assert "is there already" in said.err
+    assert target.read_bytes() == before
+    said = here("diagnostics", "--output", tmp_path / "no" / "such" / "place.zip")
+    assert said.code == 1
+    assert "cannot be written" in said.err
+
+
+def test_diagnostics_say_nothing_of_the_subjects_of_the_library(here, tmp_path, log_folder):
+    simulated = here("simulate", "--seconds", "0.5", "--out", tmp_path / "sessions")
+    path = Path(simulated.out.strip())
+    renamed = tmp_path / "sessions" / "Eva_Köhler" / "2026-01-31" / "left_wrist.mcap"
+    renamed.parent.mkdir(parents=True)
+    path.rename(renamed)
+    (log_folder / "studio.log").write_text(f"INFO Eva Köhler, left wrist, {renamed}\n", "utf-8")
+    target = tmp_path / "help.zip"
+    here("diagnostics", "--output", target, "--sessions", tmp_path / "sessions")
+    with zipfile.ZipFile(target) as zipped:
+        whole = "".join(zipped.read(name).decode() for name in zipped.namelist())
+    assert "INFO" in whole
+    for word in ("Köhler", "left wrist", "left_wrist", str(tmp_path)):
+        assert word not in whole

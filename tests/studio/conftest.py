@@ -1,16 +1,34 @@
-"""A take of the showcase, processed once."""
+"""A take of the showcase, processed once; and a studio without a page and without a device."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
+from app import intents
 from app import review as reviewing
+from app.jobs import Jobs
 from app.review import Review
+from app.state import State
+from app.studio import Studio
+from handstudio.device.capture import Capture
+from handstudio.device.orders import Newest, Order, Phase, Report
+from handstudio.device.recorder import Recorder
+from handstudio.export.csv import Content, Window, export_csv
+from handstudio.pipeline import Motion
 from handstudio.process import process
+from handstudio.recording.header import Header
 from handstudio.recording.simulated import simulate
+from handstudio.recording.subjects import Subject, create_subject
 from handstudio.recording.take import Take, open_take
+from handstudio.settings import SettingsStore
+
+TICK_S = 0.016
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +40,103 @@ def take(tmp_path_factory: pytest.TempPathFactory) -> Take:
 @pytest.fixture(scope="session")
 def review(take: Take) -> Review:
     return reviewing.opened(take, process(take))
+
+
+@dataclass
+class StillCapture:
+    """A capture in which happens what a test says."""
+
+    newest: Newest = Newest()
+    orders: list[Order] = field(default_factory=list)
+    waiting: list[Report] = field(default_factory=list)
+    motions: list[Motion] = field(default_factory=list)
+
+    def send(self, order: Order) -> None:
+        self.orders.append(order)
+
+    def drain(self) -> list[Motion]:
+        motions, self.motions = self.motions, []
+        return motions
+
+    def reports(self) -> list[Report]:
+        waiting, self.waiting = self.waiting, []
+        return waiting
+
+
+class PromptJobs:
+    """Does long work at once."""
+
+    share_done = 1.0
+
+    def process(self, path: Path) -> Future[None]:
+        return done(lambda: process(open_take(path)))
+
+    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
+        take = open_take(path)
+        motion, setup = process(take), take.header.setup
+        return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
+
+
+def done(work: Callable[[], Any]) -> Future[Any]:
+    future: Future[Any] = Future()
+    try:
+        future.set_result(work())
+    except Exception as error:
+        future.set_exception(error)
+    return future
+
+
+@pytest.fixture
+def capture() -> StillCapture:
+    return StillCapture()
+
+
+@pytest.fixture
+def studio(capture: StillCapture, tmp_path: Path) -> Studio:
+    sessions = tmp_path / "sessions"
+    store = SettingsStore.opened(tmp_path / "settings.json")
+    studio = Studio(
+        cast("Capture", capture), cast("Jobs", PromptJobs()), store, State(sessions), "en"
+    )
+    studio.refresh_takes()
+    return studio
+
+
+@pytest.fixture
+def streaming(capture: StillCapture, studio: Studio, review: Review) -> Studio:
+    """A device sends, and S01 was chosen."""
+    create_subject(studio.state.sessions, Subject("S01", "right", 187.0))
+    studio.refresh_takes()
+    capture.newest = Newest(
+        Phase.STREAMING, "virtual:", setup=review.setup, motion=review.motion[-1:]
+    )
+    studio.send(intents.PagesOpen(1))
+    after(studio, intents.ChooseSubject("S01"), intents.SetCountdown(0))
+    capture.orders.clear()
+    return studio
+
+
+class StillRecorder(Recorder):
+    """A take that is on, as far as the page looks at it; nothing is written."""
+
+    seconds = 12.3  # type: ignore[assignment]
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self.path, self.header = path, header
+        self.bytes, self.first_us, self.failure = 1_000_000, 0, None
+
+
+def recording(capture: StillCapture, path: Path) -> StillRecorder:
+    """From now on a take is on."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    setup = capture.newest.setup
+    assert setup is not None
+    recorder = StillRecorder(path, Header(path.stem, "S01", 0, setup, "wire", "virtual:"))
+    capture.newest = replace(capture.newest, recorder=recorder)
+    return recorder
+
+
+def after(studio: Studio, *asked: intents.Intent) -> State:
+    for intent in asked:
+        studio.send(intent)
+    return studio.tick(TICK_S)

@@ -3,126 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, cast
+from dataclasses import replace
 
 import pytest
 
-from app import intents, view
-from app.jobs import Jobs
-from app.studio import State, Studio
-from handstudio.device.capture import Capture
-from handstudio.device.orders import (
-    Ask,
-    Connect,
-    Newest,
-    Order,
-    Phase,
-    Report,
-    SetHand,
-    StartTake,
-    TakeDone,
-)
+from app import intents
+from app.studio import Studio
+from app.views import page as view
+from handstudio.device.orders import Ask, Connect, Newest, Phase, TakeDone
 from handstudio.errors import DeviceError
-from handstudio.export.csv import Content, Window, export_csv
-from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.simulated import simulate
-from handstudio.recording.take import Take, open_take
+from handstudio.recording.take import Take
 
-
-@dataclass
-class StillCapture:
-    """A capture in which happens what a test says."""
-
-    newest: Newest = Newest()
-    orders: list[Order] = field(default_factory=list)
-    waiting: list[Report] = field(default_factory=list)
-    motions: list[Motion] = field(default_factory=list)
-
-    def send(self, order: Order) -> None:
-        self.orders.append(order)
-
-    def drain(self) -> list[Motion]:
-        motions, self.motions = self.motions, []
-        return motions
-
-    def reports(self) -> list[Report]:
-        waiting, self.waiting = self.waiting, []
-        return waiting
-
-
-class PromptJobs:
-    """Does long work at once."""
-
-    share_done = 1.0
-
-    def process(self, path: Path) -> Future[None]:
-        return done(lambda: process(open_take(path)))
-
-    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
-        take = open_take(path)
-        motion, setup = process(take), take.header.setup
-        return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
-
-
-def done(work: Callable[[], Any]) -> Future[Any]:
-    future: Future[Any] = Future()
-    try:
-        future.set_result(work())
-    except Exception as error:
-        future.set_exception(error)
-    return future
-
-
-@pytest.fixture
-def capture() -> StillCapture:
-    return StillCapture()
-
-
-@pytest.fixture
-def studio(capture: StillCapture, tmp_path: Path) -> Studio:
-    return Studio(cast("Capture", capture), cast("Jobs", PromptJobs()), State(sessions=tmp_path))
-
-
-def after(studio: Studio, *asked: intents.Intent) -> State:
-    for intent in asked:
-        studio.send(intent)
-    return studio.tick(0.016)
-
-
-def test_record_asks_for_a_new_file_each_time(studio: Studio, capture: StillCapture) -> None:
-    after(studio, intents.SetSubject("P7"), intents.SetTakeName("reach"), intents.ToggleRecording())
-    order = capture.orders[-1]
-    assert isinstance(order, StartTake)
-    assert order.subject == "P7"
-    assert order.path.name == "reach.mcap"
-    order.path.parent.mkdir(parents=True)
-    order.path.touch()
-    after(studio, intents.ToggleRecording())
-    second = capture.orders[-1]
-    assert isinstance(second, StartTake)
-    assert second.path.name == "reach-2.mcap"
-
-
-def test_a_name_of_nothing_is_explained_not_recorded(studio: Studio, capture: StillCapture) -> None:
-    state = after(studio, intents.SetTakeName("  /// "), intents.ToggleRecording())
-    assert capture.orders == []
-    assert state.messages[0].alarm
-    assert "Type a name" in state.messages[0].remedy
-
-
-def test_hand_length_reaches_the_device_and_stays_plausible(
-    studio: Studio, capture: StillCapture
-) -> None:
-    state = after(studio, intents.SetHandLength(1000.0))
-    assert state.hand_length_mm == 240.0
-    order = capture.orders[-1]
-    assert isinstance(order, SetHand)
-    assert order.hand.hand_length_m == pytest.approx(0.240)
+from .conftest import StillCapture, after
 
 
 def test_blink_names_the_sensor_and_three_seconds(studio: Studio, capture: StillCapture) -> None:
@@ -134,7 +28,7 @@ def test_a_take_that_is_done_is_in_the_list_and_open(studio: Studio, capture: St
     path = simulate(studio.state.sessions, seconds=3.0)
     capture.waiting.append(TakeDone(path))
     state = studio.tick(0.016)
-    assert [entry.path for entry in state.takes] == [path]
+    assert [entry.path for entry in state.shelf.takes] == [path]
     state = studio.tick(0.016)
     assert state.review is not None
     assert state.review.take.path == path
@@ -146,7 +40,7 @@ def test_export_writes_the_file_and_sends_it_to_the_page_that_asked(studio: Stud
     after(studio, intents.OpenTake(path))
     state = after(studio, intents.Export("angles", page=5))
     assert [download.page for download in state.downloads] == [5]
-    assert state.downloads[0].path.read_bytes().startswith(b'"time_s"')
+    assert state.downloads[0].content.read_bytes().startswith(b'"time_s"')
 
 
 def test_export_holds_exactly_the_part_that_counts(studio: Studio) -> None:
@@ -154,7 +48,7 @@ def test_export_holds_exactly_the_part_that_counts(studio: Studio) -> None:
     after(studio, intents.OpenTake(path))
     after(studio, intents.Seek(1.0), intents.MarkIn())
     state = after(studio, intents.Seek(2.5), intents.MarkOut(), intents.Export("angles", page=1))
-    rows = state.downloads[0].path.read_text(encoding="utf-8").splitlines()[1:]
+    rows = state.downloads[0].content.read_text(encoding="utf-8").splitlines()[1:]
     times = [float(row.split(",")[0]) for row in rows]
     assert times[0] == pytest.approx(1.0, abs=0.006)
     assert times[-1] == pytest.approx(2.5, abs=0.006)
@@ -165,7 +59,7 @@ def test_a_damaged_take_is_explained_and_the_studio_goes_on(studio: Studio) -> N
     path.write_bytes(path.read_bytes()[:5000])
     state = after(studio, intents.OpenTake(path))
     assert "handstudio recover" in state.messages[0].remedy
-    assert after(studio, intents.SetSubject("S02")).subject == "S02"
+    assert after(studio, intents.SetTakeName("next")).settings.take_name == "next"
 
 
 def test_what_the_capture_reports_is_said_once(studio: Studio, capture: StillCapture) -> None:

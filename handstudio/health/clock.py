@@ -10,6 +10,8 @@ from collections import deque
 
 import numpy as np
 
+from handstudio.health.limits import DRIFT_BINS
+
 _BIN_US = 1_000_000
 _BINS = 120
 
@@ -40,6 +42,20 @@ class ClockEstimate:
             return None
         device, difference = np.array(self._bins, dtype=float).T
         return float(np.polyfit(device - device[0], difference - difference[0], 1)[0] * 1e6)
+
+    @property
+    def sure_drift_ppm(self) -> float | None:
+        """The same from the least delayed of the first and of the last third alone [1e-6].
+
+        Rougher, but a host that stood still for seconds does not look like a clock that runs
+        fast. None within the first `DRIFT_BINS` seconds.
+        """
+        if len(self._bins) < DRIFT_BINS:
+            return None
+        bins, third = list(self._bins), len(self._bins) // 3
+        first = min(bins[:third], key=lambda one: one[1])
+        last = min(bins[-third:], key=lambda one: one[1])
+        return (last[1] - first[1]) * 1e6 / (last[0] - first[0])
 
     def offset_ns(self) -> int | None:
         """Host minus device time now, least delay included; None before the first arrival."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from handstudio.device.clock import ClockEstimate
+from handstudio.health.clock import ClockEstimate
 
 START_NS = 1_800_000_000_000_000_000
 

@@ -10,22 +10,19 @@ from jaxtyping import Bool, Float
 
 from app.channels import Plot, plots_of
 from app.live import SPAN_S
-from app.studio import State
-from app.words import _
+from app.look import Camera, camera_for
+from app.state import State
+from app.views.health import worst_of
+from app.words import _, in_words
 from handstudio.arrays import Array
 from handstudio.device.health import HealthView
 from handstudio.device.orders import Newest, Phase
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import Skeleton
 from handstudio.kinematics import doubtful_segments, pose_of, skeleton_of
+from handstudio.layout import Layout
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import Setup
-
-LATE_MS = 100.0
-"""A hand that is shown later than this feels detached."""
-
-LOSS_PERCENT = 1.0
-"""More lost instants than this are worth a look at cable and rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +39,12 @@ class Status:
 class HandView:
     """A hand to draw."""
 
+    layout: Layout
     skeleton: Skeleton
     pose: Pose
     doubtful: Bool[Array, " k"]
     dead: Bool[Array, " k"]
+    lit: frozenset[str]  # names of the sensors to point out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,21 +72,17 @@ def status_of(state: State) -> Status:
     newest = state.newest
     match newest.phase:
         case Phase.IDLE:
-            return Status(_("No device"), "", _("Choose one under Device."), alarm=False)
+            advice = " ".join(filter(None, [_("Choose one under Device."), _shared(state)]))
+            return Status(_("No device"), "", advice, alarm=False)
         case Phase.CONNECTING:
-            return Status(_("Connecting"), newest.address, "", alarm=False)
+            return Status(_("Connecting"), newest.address, _("Asking who is there."), alarm=False)
         case Phase.FAILED:
-            problem = newest.problem
-            return Status(
-                _("Not connected"),
-                problem.what if problem else "",
-                problem.remedy if problem else "",
-                alarm=True,
-            )
+            what, remedy = in_words(newest.problem) if newest.problem is not None else ("", "")
+            return Status(_("Not connected"), what, remedy, alarm=True)
         case Phase.LOST:
             return _lost(newest)
         case Phase.STREAMING:
-            return _streaming(newest)
+            return _streaming(state)
 
 
 def figures_of(health: HealthView) -> str:
@@ -99,24 +94,6 @@ def figures_of(health: HealthView) -> str:
             _("latency {ms:.1f} ms").format(ms=health.latency_p99_ms),
         ]
     )
-
-
-def recording_of(newest: Newest) -> str:
-    """How the take that is recorded stands; empty where there is none."""
-    recorder = newest.recorder
-    if recorder is None:
-        return ""
-    return _("{name}: {clock}, {megabytes:.1f} MB").format(
-        name=recorder.path.stem,
-        clock=clock_of(recorder.seconds),
-        megabytes=recorder.bytes / 1e6,
-    )
-
-
-def clock_of(seconds: float) -> str:
-    """Seconds as a person reads them: 1:02.3."""
-    minutes, rest = divmod(max(0.0, seconds), 60.0)
-    return f"{int(minutes)}:{rest:04.1f}"
 
 
 def scene_of(state: State) -> HandView | SensorsView | None:
@@ -131,7 +108,32 @@ def scene_of(state: State) -> HandView | SensorsView | None:
     doubtful = doubtful_segments(setup, motion.doubt & ~np.uint8(Doubt.SILENT))[0]
     dead = doubtful_segments(setup, motion.doubt & np.uint8(Doubt.SILENT))[0]
     single = Pose(pose.q_world_segment[0], pose.t_world_joint[0], pose.t_world_tip[0])
-    return HandView(skeleton_of(setup), single, doubtful, dead)
+    lit = frozenset[str]()
+    if state.review is None and state.shaking is not None and state.shaking.sensor is not None:
+        lit = frozenset({setup.layout.names[state.shaking.sensor]})
+    return HandView(setup.layout, skeleton_of(setup), single, doubtful, dead, lit)
+
+
+def overlay_of(state: State) -> str:
+    """Words in the middle of the picture where there is no hand to see, or it is not of now."""
+    streaming = (
+        _("Connected; waiting for the first motion …") if state.newest.motion is None else ""
+    )
+    words = {
+        Phase.IDLE: _("No device yet: connect one on the left, or try the virtual glove."),
+        Phase.CONNECTING: _("Connecting …"),
+        Phase.FAILED: _("Not connected: the left side says why."),
+        Phase.LOST: _("Device lost: this is the hand as it was last seen."),
+        Phase.STREAMING: streaming,
+    }
+    return words[state.newest.phase] if state.review is None else ""
+
+
+def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
+    """Where the picture is taken from."""
+    if isinstance(view, HandView):
+        return camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
+    return camera_for(state.view, None, None, 0.0)
 
 
 def curves_of(state: State) -> Curves | None:
@@ -156,14 +158,20 @@ def caption_of(state: State) -> str:
         what = _("Replay · {name} · {subject}").format(
             name=review.take.path.stem, subject=review.take.header.subject
         )
-        return " · ".join(filter(None, [what, review.setup.layout.missing_for_hand]))
+        return " · ".join(filter(None, [what, _missing(review.setup)]))
     newest = state.newest
     if newest.setup is None or newest.motion is None:
         return _("No hand yet")
     device = newest.setup.device.name if newest.setup.device else newest.address
     doubts = _doubts(newest.setup, newest.motion)
-    missing = newest.setup.layout.missing_for_hand
+    missing = _missing(newest.setup)
     return " · ".join(filter(None, [_("Live"), device, doubts, missing]))
+
+
+def _missing(setup: Setup) -> str:
+    """Why there is no hand, where there is none."""
+    why = setup.layout.no_hand
+    return "" if why is None else in_words(why)[0]
 
 
 def as_html(status: Status) -> str:
@@ -189,25 +197,28 @@ def _shown(state: State) -> tuple[Setup, Motion] | None:
 
 def _lost(newest: Newest) -> Status:
     if newest.problem is not None:
-        return Status(_("Device lost"), newest.problem.what, newest.problem.remedy, alarm=True)
+        return Status(_("Device lost"), *in_words(newest.problem), alarm=True)
     advice = _("Check the cable; it is picked up again by itself.")
     if newest.recorder is not None:
         advice += " " + _("The take goes on, the gap will be marked.")
     return Status(_("Device lost"), newest.address, advice, alarm=True)
 
 
-def _streaming(newest: Newest) -> Status:
-    health = newest.health
-    advice = ""
-    if newest.setup is not None and health.silent:
-        names = ", ".join(newest.setup.layout.names[i] for i in health.silent)
-        advice = _("{names} not answering: check its cable.").format(names=names)
-    elif health.loss_percent > LOSS_PERCENT:
-        advice = _("Packets get lost: check the cable, or lower the rate.")
-    elif health.latency_p99_ms > LATE_MS:
-        advice = _("The hand is shown late: close other programs, or lower the rate.")
+def _streaming(state: State) -> Status:
+    newest = state.newest
     word = _("Recording") if newest.recorder is not None else _("Connected")
-    return Status(word, figures_of(health), advice, alarm=bool(advice))
+    advice = worst_of(state)
+    if advice is not None:
+        told = f"{advice.title}: {advice.remedy}" if advice.remedy else advice.title
+        return Status(word, figures_of(newest.health), told.replace("::", ":"), alarm=True)
+    return Status(word, figures_of(newest.health), _shared(state), alarm=False)
+
+
+def _shared(state: State) -> str:
+    """That somebody else may be pressing buttons too."""
+    if state.pages < 2:
+        return ""
+    return _("{count} pages are open; each of them controls this studio.").format(count=state.pages)
 
 
 def _doubts(setup: Setup, motion: Motion) -> str:

@@ -1,0 +1,73 @@
+"""How the hand is looked at: from where, and what of it is shown. Pure; knows no viser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from jaxtyping import Float
+
+from app.bones import hand_length
+from handstudio.arrays import Array
+from handstudio.hand.pose import Pose
+from handstudio.hand.skeleton import SEGMENTS, Skeleton
+from handstudio.maths import so3
+
+
+class View(Enum):
+    """Where the picture is taken from."""
+
+    DESK = "desk"  # from behind and above, as one sees one's own hand on a desk
+    PALM = "palm"
+    BACK = "back"
+    THUMB = "thumb"
+    FOLLOW = "follow"  # the back of the hand, kept in sight while it moves
+
+
+LASTING = (View.DESK, View.FOLLOW)
+"""Views that suit whatever the hand does next, and so are kept from one start to the next."""
+
+DESK_PLACE = (-0.15, -0.03, 0.46)
+DESK_TARGET = (0.0, 0.31, 0.0)
+
+_DISTANCE = 1.8  # from the hand's middle, in hand lengths: the whole hand, with some air
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Where the camera is, what it looks at, which way is up in the picture."""
+
+    place: Float[Array, "3"]
+    target: Float[Array, "3"]
+    up: Float[Array, "3"]
+
+
+def camera_for(view: View, skeleton: Skeleton | None, pose: Pose | None, yaw: float) -> Camera:
+    """The camera of a view for the hand as it is now, in the world that is drawn.
+
+    Without a hand every view is that of the desk.
+    """
+    if view is View.DESK or skeleton is None or pose is None:
+        return Camera(np.array(DESK_PLACE), np.array(DESK_TARGET), np.array([0.0, 0.0, 1.0]))
+    hand = SEGMENTS.index("hand")
+    q_picture_hand = so3.multiply(so3.about_z(yaw), pose.q_world_segment[hand])
+    ulnar, along, dorsal = so3.to_matrix(q_picture_hand).T
+    radial = -ulnar if skeleton.side == "right" else ulnar
+    size = hand_length(skeleton)
+    wrist = so3.rotate(so3.about_z(yaw), pose.t_world_joint[hand])
+    target = wrist + 0.45 * size * along
+    towards = {
+        View.PALM: -dorsal,
+        View.BACK: dorsal,
+        View.THUMB: radial,
+        View.FOLLOW: between(dorsal, -along, 0.35),
+    }[view]
+    return Camera(target + _DISTANCE * size * towards, target, along)
+
+
+def between(a: Array, b: Array, share: float) -> Array:
+    """A direction between two, nearer to the first the smaller the share."""
+    mixed = (1.0 - share) * a + share * b
+    out: Array = mixed / np.linalg.norm(mixed)
+    return out

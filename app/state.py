@@ -1,0 +1,114 @@
+"""Everything the page is drawn from: one value, made anew by the studio, read by everybody."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.live import LiveHistory
+from app.look import View
+from app.review import Review
+from app.shaken import Shaking
+from app.sounds import Sound
+from app.taking import Countdown, Disk
+from handstudio.device import find
+from handstudio.device.find import Found
+from handstudio.device.orders import Newest
+from handstudio.recording.bin import Binned
+from handstudio.recording.library import Entry
+from handstudio.recording.subjects import Subject
+from handstudio.settings import Settings
+
+HAND_LENGTH_MM = (120.0, 240.0)
+"""Plausible hand lengths, children to the largest adults [mm]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Something to tell the person once."""
+
+    text: str
+    remedy: str = ""
+    alarm: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Download:
+    """A file for one page: one that exists, or one that was made for it."""
+
+    page: int
+    name: str
+    content: Path | bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A job that runs, in words, and how far it is."""
+
+    words: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shelf:
+    """The library as it is shown."""
+
+    takes: tuple[Entry, ...] = ()  # all of them, newest first
+    found: tuple[Entry, ...] = ()  # those in which the words searched for occur
+    search: str = ""
+    subjects: tuple[Subject, ...] = ()
+    undo: str = ""  # what can be taken back, in words
+    binned: tuple[Binned, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """Everything the page is drawn from.
+
+    Attributes:
+        settings: What is kept from one start to the next.
+        language: The language that is spoken now.
+        pages: How many pages are open; all of them show and control the same studio.
+        page_ms: How long the slowest of them takes to answer what it is sent [ms].
+        view: Where the picture is taken from; ``aimed`` counts how often it was asked for.
+        yaw: Turn of the picture about the vertical; None: to be found anew.
+        asking: The page that must say whose hand it is before a take can begin.
+    """
+
+    sessions: Path
+    newest: Newest = Newest()
+    settings: Settings = field(default_factory=Settings)
+    language: str = "en"
+    pages: int = 0
+    page_ms: float | None = None
+    devices: tuple[Found, ...] = (find.VIRTUAL,)
+    searching: bool = False
+    shelf: Shelf = Shelf()
+    countdown: Countdown | None = None
+    disk: Disk | None = None
+    marks: int = 0  # put into the take that is on
+    live: LiveHistory | None = None
+    shaking: Shaking | None = None
+    review: Review | None = None
+    work: Work | None = None
+    view: View = View.DESK
+    aimed: int = 0
+    yaw: float | None = None
+    # told once, and gone at the next tick
+    asking: int | None = None
+    messages: tuple[Message, ...] = ()
+    downloads: tuple[Download, ...] = ()
+    sounds: tuple[Sound, ...] = ()
+
+    @property
+    def subject(self) -> Subject | None:
+        """The person whose takes are recorded; None: nobody was chosen."""
+        code = self.settings.subject
+        return next((known for known in self.shelf.subjects if known.code == code), None)
+
+    @property
+    def hand_length_mm(self) -> float:
+        """The wearer's hand length."""
+        subject = self.subject
+        measured = subject.hand_length_mm if subject is not None else None
+        return self.settings.hand_length_mm if measured is None else measured

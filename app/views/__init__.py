@@ -1,0 +1,1 @@
+"""What to show, made of the state alone: texts, figures, poses."""

@@ -1,0 +1,1 @@
+"""How a stream does: figures, what is wrong with it, and what of that is kept in a take."""
