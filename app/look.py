@@ -12,7 +12,10 @@ from app.bones import hand_length
 from handstudio.arrays import Array
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import SEGMENTS, Skeleton
+from handstudio.kinematics import segment_attitudes
 from handstudio.maths import so3
+from handstudio.pipeline import Motion
+from handstudio.setup import Setup
 
 
 class View(Enum):
@@ -30,6 +33,8 @@ LASTING = (View.DESK, View.FOLLOW)
 
 DESK_PLACE = (-0.15, -0.03, 0.46)
 DESK_TARGET = (0.0, 0.31, 0.0)
+
+_AWAY = np.pi / 2  # y of the picture
 
 _DISTANCE = 1.8  # from the hand's middle, in hand lengths: the whole hand, with some air
 
@@ -71,3 +76,12 @@ def between(a: Array, b: Array, share: float) -> Array:
     mixed = (1.0 - share) * a + share * b
     out: Array = mixed / np.linalg.norm(mixed)
     return out
+
+
+def facing(setup: Setup, motion: Motion) -> float:
+    """The turn about the vertical that lets the forearm point away from the viewer [rad]."""
+    if not setup.layout.is_hand:
+        return 0.0
+    q_world_forearm = segment_attitudes(setup, motion.q_world_sensor)[0, 0]
+    along = so3.rotate(q_world_forearm, np.array([0.0, 1.0, 0.0]))
+    return _AWAY - float(np.arctan2(along[1], along[0]))

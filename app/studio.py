@@ -6,27 +6,26 @@ Knows no viser; one thread calls `Studio.tick`, any thread may call `Studio.send
 from __future__ import annotations
 
 import queue
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from app import diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.jobs import Jobs, Stopped
 from app.keeping import Keeper
-from app.look import LASTING, View
+from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
 from app.review import Review
 from app.sounds import Sound
-from app.state import Download, Message, State, Work
+from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
+from app.workshop import Computed, Exported, Gathered, Workshop
 from handstudio.device.capture import Capture
 from handstudio.device.orders import (
     Ask,
@@ -39,8 +38,6 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Window
-from handstudio.kinematics import segment_attitudes
-from handstudio.maths import so3
 from handstudio.process import kept_motion
 from handstudio.protocol.packets import TIP_SENSOR, Command
 from handstudio.recording import notes as noting
@@ -51,31 +48,6 @@ from handstudio.setup import HandModel
 
 _BLINK_MS = 3000
 _ONCE_S = 0.4  # the space bar is a key of the page, and also presses the button clicked last
-_FORWARD = np.pi / 2  # the forearm points along y of the picture, away from the viewer
-
-
-@dataclass(frozen=True, slots=True)
-class _ShowTake:
-    take: Take
-
-
-@dataclass(frozen=True, slots=True)
-class _SendFile:
-    page: int
-
-
-@dataclass(frozen=True, slots=True)
-class _SendDiagnostics:
-    page: int
-
-
-@dataclass
-class _Pending:
-    """Work whose end is waited for."""
-
-    future: Future[Any]
-    then: _ShowTake | _SendFile | _SendDiagnostics
-    words: str
 
 
 @dataclass
@@ -88,13 +60,12 @@ class Studio:
     state: State
     language: str | None = None  # asked for at the start; until another is chosen on the page
     _inbox: queue.SimpleQueue[intents.Intent | Looked] = field(default_factory=queue.SimpleQueue)
-    _pending: list[_Pending] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._keeper = Keeper(self.state.sessions)
         self._taker = Taker(self.capture, self.state.sessions)
         self._looker = Looker(self._inbox.put)
-        self._aside = ThreadPoolExecutor(1, "aside")
+        self._workshop = Workshop(self.jobs)
         self._now_s = 0.0
         self._toggled_s = -1.0
         self._change()
@@ -178,7 +149,7 @@ class Studio:
             case intents.Export():
                 self._export(intent)
             case intents.CancelWork():
-                self.jobs.cancel()
+                self._workshop.cancel()
             case intents.SendDiagnostics(page=page):
                 self._send_diagnostics(page)
             case intents.FaceForward():
@@ -212,6 +183,7 @@ class Studio:
                 if then_record:
                     self._toggle_recording(page=-1)
             case intents.DeleteSubject(code=code, typed=typed):
+                self._refuse_while_working()
                 if review is not None and review.take.header.subject == code:
                     self.state = replace(self.state, review=None, yaw=None)
                 self._tell(keeper.delete_subject(code, typed))
@@ -220,8 +192,10 @@ class Studio:
             case intents.Search(text=text):
                 keeper.search(text)
             case intents.RenameTake(path=path, name=name):
+                self._refuse_while_working()
                 self._reopen(path, keeper.rename(path, name))
             case intents.BinTake(path=path):
+                self._refuse_while_working()
                 if review is not None and review.take.path == path:
                     self.state = replace(self.state, review=None, yaw=None)
                 self._tell(keeper.bin(path))
@@ -245,6 +219,12 @@ class Studio:
             case _:
                 return False
         return True
+
+    def _refuse_while_working(self) -> None:
+        if self._workshop.work is not None:
+            raise HandstudioError(
+                "A take is being computed or exported.", "Wait until it is done, or cancel it."
+            )
 
     def _prefer(self, intent: intents.Intent) -> bool:
         """Settings; False: it is about something else."""
@@ -385,8 +365,7 @@ class Studio:
         if motion is not None:
             self._show(reviewing.opened(take, motion))
             return
-        text = _("Computing the motion of {name}").format(name=path.stem)
-        self._pending.append(_Pending(self.jobs.process(path), _ShowTake(take), text))
+        self._workshop.compute(take)
 
     def _show(self, review: Review) -> None:
         notes = noting.Notes()
@@ -424,12 +403,8 @@ class Studio:
         review = self.state.review
         if review is None:
             return
-        path = review.take.path
-        target = path.with_suffix(f".{order.content}.csv")
-        text = _("Exporting {name}").format(name=target.name)
         window = Window(review.in_s, review.out_s)
-        future = self.jobs.export(path, target, order.content, window)
-        self._pending.append(_Pending(future, _SendFile(order.page), text))
+        self._workshop.export(review.take.path, order.content, window, order.page)
 
     def _send_diagnostics(self, page: int) -> None:
         settings = msgspec.to_builtins(self.store.settings)
@@ -441,8 +416,7 @@ class Studio:
             takes=self._keeper.shelf.takes,
             names=(self.store.settings.subject, self.store.settings.take_name),
         )
-        text = _("Gathering diagnostics")
-        self._pending.append(_Pending(self._aside.submit(work), _SendDiagnostics(page), text))
+        self._workshop.gather(work, page)
 
     # --- reports --------------------------------------------------------------------------------
 
@@ -475,57 +449,41 @@ class Studio:
                 self._say(error)
 
     def _finish_work(self) -> None:
-        for done in [pending for pending in self._pending if pending.future.done()]:
-            self._pending.remove(done)
-            try:
-                self._use(done, done.future.result())
-            except Stopped as stopped:
-                self._tell(" ".join(words.in_words(stopped)))
-            except HandstudioError as error:
-                self._say(error)
-            except Exception as error:  # the job's process may have been killed
-                self._say(
-                    HandstudioError(
-                        "{work}: {reason}",
-                        "Try again; if it fails again, restart the studio.",
-                        work=done.words,
-                        reason=repr(error),
-                    )
-                )
-        work = Work(self._pending[0].words, self.jobs.share_done) if self._pending else None
-        self.state = replace(self.state, work=work)
+        for outcome in self._workshop.done():
+            match outcome:
+                case Computed(take=take):
+                    self._show_computed(take)
+                case Exported(download=download):
+                    self._tell(_("Exported {path}.").format(path=download.content))
+                    self._send_file(download)
+                case Gathered(download=download):
+                    self._send_file(download)
+                case Stopped():
+                    self._tell(" ".join(words.in_words(outcome)))
+                case HandstudioError():
+                    self._say(outcome)
+        self.state = replace(self.state, work=self._workshop.work)
 
-    def _use(self, done: _Pending, result: object) -> None:
-        match done.then:
-            case _ShowTake(take=take):
-                motion = kept_motion(take)
-                if motion is not None:
-                    self._show(reviewing.opened(take, motion))
-            case _SendFile(page=page) if isinstance(result, Path):
-                self._tell(_("Exported {path}.").format(path=result))
-                self._send_file(Download(page, result.name, result))
-            case _SendDiagnostics(page=page) if isinstance(result, bytes):
-                self._send_file(Download(page, "handstudio-diagnostics.zip", result))
-            case _:
-                pass
+    def _show_computed(self, take: Take) -> None:
+        motion = kept_motion(take)
+        try:
+            if motion is not None:
+                self._show(reviewing.opened(take, motion))
+        except HandstudioError as error:
+            self._say(error)
 
     def _face_once(self) -> None:
         """Choose the turn of the picture when there is a first pose to choose it by."""
+        review, newest = self.state.review, self.state.newest
         if self.state.yaw is not None:
             return
-        review, newest = self.state.review, self.state.newest
         if review is not None:
-            setup, motion = review.setup, review.instant
+            yaw = facing(review.setup, review.instant)
         elif newest.setup is not None and newest.motion is not None:
-            setup, motion = newest.setup, newest.motion
+            yaw = facing(newest.setup, newest.motion)
         else:
             return
-        if not setup.layout.is_hand:
-            self.state = replace(self.state, yaw=0.0)
-            return
-        q_world_forearm = segment_attitudes(setup, motion.q_world_sensor)[0, 0]
-        along = so3.rotate(q_world_forearm, np.array([0.0, 1.0, 0.0]))
-        self.state = replace(self.state, yaw=_FORWARD - float(np.arctan2(along[1], along[0])))
+        self.state = replace(self.state, yaw=yaw)
 
     # --- settings -------------------------------------------------------------------------------
 

@@ -5,6 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import msgspec
+
+from handstudio.errors import TakeError
+
 BACKUP = ".bak"
 
 
@@ -19,3 +23,20 @@ def write_atomically(path: Path, data: bytes) -> None:
     if path.exists():
         path.with_name(path.name + BACKUP).write_bytes(path.read_bytes())
     fresh.replace(path)
+
+
+def write_json(path: Path, value: msgspec.Struct) -> None:
+    """Store a value as JSON that a person can read; what was there before stays as a backup.
+
+    Raises:
+        TakeError: it cannot be written; what was there before still is.
+    """
+    try:
+        write_atomically(path, msgspec.json.format(msgspec.json.encode(value)))
+    except OSError as error:
+        raise TakeError(
+            "{path}: cannot be written ({reason}).",
+            "Free some space or check the folder's permissions.",
+            path=path,
+            reason=error.strerror or error,
+        ) from error

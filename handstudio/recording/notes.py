@@ -13,7 +13,7 @@ from typing import TypeVar
 import msgspec
 
 from handstudio.errors import TakeError
-from handstudio.recording.atomic import BACKUP, write_atomically
+from handstudio.recording.atomic import BACKUP, write_json
 from handstudio.recording.naming import closed_path
 
 _Item = TypeVar("_Item")
@@ -128,15 +128,7 @@ def save_notes(take: Path, notes: Notes) -> None:
         TakeError: they cannot be written; the notes before are still there.
     """
     path = notes_path(take)
-    try:
-        write_atomically(path, msgspec.json.format(msgspec.json.encode(notes)))
-    except OSError as error:
-        raise TakeError(
-            "{path}: cannot be written ({reason}).",
-            "Free some space or check the folder's permissions.",
-            path=path,
-            reason=error.strerror or error,
-        ) from error
+    write_json(path, notes)
 
 
 def copy_notes(take: Path, other: Path) -> None:

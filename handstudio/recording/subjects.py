@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from handstudio.errors import HandstudioError, TakeError
-from handstudio.recording.atomic import BACKUP, write_atomically
+from handstudio.recording.atomic import BACKUP, write_json
 from handstudio.recording.library import folders
 from handstudio.recording.naming import file_name, same_name
 
@@ -156,15 +156,7 @@ def _read(folder: Path) -> Subject:
 def _write(sessions: Path, subject: Subject) -> Subject:
     _refuse_length(subject.hand_length_mm)
     path = sessions / subject.code / FILE
-    try:
-        write_atomically(path, msgspec.json.format(msgspec.json.encode(subject)))
-    except OSError as error:
-        raise TakeError(
-            "{path}: cannot be written ({reason}).",
-            "Free some space or check the folder's permissions.",
-            path=path,
-            reason=error.strerror or error,
-        ) from error
+    write_json(path, subject)
     return subject
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -55,8 +56,14 @@ def start_studio(tmp_path: Path) -> Iterator[Start]:
     running: list[RunningStudio] = []
 
     def start(
-        *arguments: str, sessions: Path | None = None, language: str | None = "en"
+        *arguments: str,
+        sessions: Path | None = None,
+        language: str | None = "en",
+        countdown_s: float | None = None,
     ) -> RunningStudio:
+        if countdown_s is not None:
+            remembered = json.dumps({"countdown_s": countdown_s})
+            (tmp_path / "settings.json").write_text(remembered, encoding="utf-8")
         spoken = ["--language", language] if language is not None else []
         places = sessions or tmp_path / "sessions", tmp_path / "settings.json"
         studio = _start(*places, *spoken, *arguments)

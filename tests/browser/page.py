@@ -59,7 +59,8 @@ def begin_recording(page: Page) -> None:
     if save.is_visible():
         save.click()
     expect(stop).to_be_visible()
-    expect(page.get_by_text("Trust:").first).to_be_visible()  # the count is over
+    ends = page.get_by_text("Space or R ends it").filter(visible=True)
+    expect(ends).to_be_visible()  # the count is over
 
 
 def end_recording(page: Page) -> None:

@@ -1,0 +1,109 @@
+"""Long work that somebody waits for: ordered here, done elsewhere, used when it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.jobs import Jobs
+from app.state import Download, Work
+from app.words import _
+from handstudio.errors import HandstudioError
+from handstudio.export.csv import Content, Window
+from handstudio.recording.take import Take
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """The motion of this take is there now."""
+
+    take: Take
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """A file was written, and is wanted by a page."""
+
+    download: Download
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """A file was made for a page, and is nowhere else."""
+
+    download: Download
+
+
+Outcome = Computed | Exported | Gathered
+
+
+@dataclass
+class _Pending:
+    future: Future[Any]
+    use: Callable[[Any], Outcome]
+    words: str
+
+
+@dataclass
+class Workshop:
+    """Keeps what is waited for; for one thread."""
+
+    jobs: Jobs
+    _pending: list[_Pending] = field(default_factory=list)
+    _aside: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1, "aside"))
+
+    @property
+    def work(self) -> Work | None:
+        """The oldest work that is waited for."""
+        if not self._pending:
+            return None
+        return Work(self._pending[0].words, self.jobs.share_done)
+
+    def compute(self, take: Take) -> None:
+        """The motion of a take."""
+        words = _("Computing the motion of {name}").format(name=take.path.stem)
+        future = self.jobs.process(take.path)
+        self._pending.append(_Pending(future, lambda _result: Computed(take), words))
+
+    def export(self, path: Path, content: Content, window: Window, page: int) -> None:
+        """A CSV of a part of a take, beside it."""
+        target = path.with_suffix(f".{content}.csv")
+
+        def use(written: Path) -> Outcome:
+            return Exported(Download(page, written.name, written))
+
+        words = _("Exporting {name}").format(name=target.name)
+        future = self.jobs.export(path, target, content, window)
+        self._pending.append(_Pending(future, use, words))
+
+    def gather(self, make: Callable[[], bytes], page: int) -> None:
+        """The diagnostics."""
+
+        def use(content: bytes) -> Outcome:
+            return Gathered(Download(page, "handstudio-diagnostics.zip", content))
+
+        words = _("Gathering diagnostics")
+        self._pending.append(_Pending(self._aside.submit(make), use, words))
+
+    def cancel(self) -> None:
+        """Stop what is on."""
+        self.jobs.cancel()
+
+    def done(self) -> Iterator[Outcome | HandstudioError]:
+        """What is done since the last call, or why it is not."""
+        for one in [pending for pending in self._pending if pending.future.done()]:
+            self._pending.remove(one)
+            try:
+                yield one.use(one.future.result())
+            except HandstudioError as error:
+                yield error
+            except Exception as error:  # the job's process may have been killed
+                yield HandstudioError(
+                    "{work}: {reason}",
+                    "Try again; if it fails again, restart the studio.",
+                    work=one.words,
+                    reason=repr(error),
+                )
