@@ -30,7 +30,7 @@ CHROMIUM_ARGUMENTS = [
     "--no-first-run",
 ]
 
-expect.set_options(timeout=20_000)  # software rendering on two busy cores
+expect.set_options(timeout=45_000)  # software rendering on two busy cores
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
-    """Open pages; one that logs an error fails the test."""
+    """Open pages; one that logs an error fails the test. Small ones: they are drawn in software."""
     errors: list[str] = []
     contexts = []
 
     def open_page(
-        studio: RunningStudio, width: int = 1440, height: int = 900, language: str = "en-US"
+        studio: RunningStudio, width: int = 1280, height: int = 640, language: str = "en-US"
     ) -> Page:
         context = browser.new_context(
             viewport={"width": width, "height": height}, accept_downloads=True, locale=language

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.browser
 
 
 def test_the_live_hand_moves(start_studio: Start, visit: Callable[..., Page]) -> None:
-    page = visit(start_studio("--virtual"))
+    page = visit(start_studio("--virtual"), 1440, 900)
     expect(page.get_by_text("Live · Virtual glove")).to_be_visible()
     expect(page.get_by_text("Connected")).to_be_visible()
     page.wait_for_timeout(3000)  # the light comes up
@@ -31,7 +31,7 @@ def test_a_take_is_recorded_replayed_and_exported(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:
     studio = start_studio("--virtual")
-    page = visit(studio)
+    page = visit(studio, 1440, 900)
     expect(page.get_by_text("Connected")).to_be_visible()
     page.wait_for_timeout(4500)  # past the rest the showcase begins with
     record(page, 4.0)

@@ -114,7 +114,7 @@ def test_hands_are_free_with_the_space_bar(start_studio: Start, visit: Callable[
 @pytest.mark.long
 def test_looks_are_chosen_and_kept(start_studio: Start, visit: Callable[..., Page]) -> None:
     studio = start_studio("--virtual")
-    page = visit(studio)
+    page = visit(studio, 1440, 900)
     expect(page.get_by_text("Connected")).to_be_visible()
     page.wait_for_timeout(3000)
     dark = look(page)
@@ -184,7 +184,7 @@ def test_two_pages_control_one_studio_and_are_told(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
     studio = start_studio("--virtual")
-    one, two = visit(studio), visit(studio)
+    one, two = visit(studio, 900, 500), visit(studio, 900, 500)
     expect(one.get_by_text("2 pages are open")).to_be_visible()
     expect(two.get_by_text("2 pages are open")).to_be_visible()
     begin_recording(one)

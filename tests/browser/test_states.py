@@ -138,7 +138,7 @@ def test_real_recordings_are_replayed(
         trial = sorted((data_dir / kind).glob("*.mat"))[0]
         write(trial, tmp_path / kind)
         import_folder(tmp_path / kind, tmp_path / "sessions", "real")
-    page = visit(start_studio())
+    page = visit(start_studio(), 1440, 900)
     page.get_by_role("tab", name="Review").click()
     for kind, curve in (("broad", "IMU"), ("dfjimu", "Turn across the joint")):
         choose(page, kind)
