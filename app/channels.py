@@ -80,7 +80,7 @@ def _hand_plots(layout: Layout, _language: str) -> tuple[tuple[Plot, tuple[str, 
             _whole,
         ),
     ]
-    shades = {"wrist_deviation_ulnar": colours.FOREARM, "thumb_cmc_flexion": colours.RING}
+    shades = {"wrist_deviation_ulnar": colours.FOREARM, "thumb_cmc_flexion": colours.THUMB_PALE}
     out = []
     for title, names, label in groups:
         present = tuple(name for name in names if name in measured)

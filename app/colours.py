@@ -6,6 +6,7 @@ After Okabe and Ito, Color Universal Design (2008), the green lightened for dark
 from __future__ import annotations
 
 THUMB = (230, 159, 0)
+THUMB_PALE = (255, 211, 120)  # a second curve of the thumb
 INDEX = (86, 180, 233)
 MIDDLE = (0, 178, 130)
 RING = (213, 94, 0)

@@ -57,7 +57,7 @@ class Keeper:
         """Put a take in the bin; what to say."""
         name = path.name.removesuffix(".recording").removesuffix(".mcap")
         undo = rubbish.move_to_bin(self.sessions, path, datetime.now(UTC))
-        self._remember(_("{name} in the bin").format(name=name), undo)
+        self._remember(_("moving {name} to the bin").format(name=name), undo)
         return _("{name} is in the bin. Ctrl+Z takes it out again.").format(name=name)
 
     def undo(self) -> tuple[str, Path] | None:

@@ -204,6 +204,8 @@ class Studio:
                 if undone is not None:
                     self._tell(undone[0])
                     self._reopen_notes(undone[1])
+                    if self.state.review is None:  # the one that was open when it went to the bin
+                        self._open(undone[1])
             case intents.RestoreTake(key=key):
                 self._tell(keeper.restore(key))
             case intents.EmptyBin():
@@ -441,7 +443,9 @@ class Studio:
 
     def _take_done(self, path: Path) -> None:
         self.refresh_takes()
-        self._tell(_("Recorded {name}.").format(name=path.stem))
+        self._tell(
+            _("Recorded {name}. Replay it below, export it under Review.").format(name=path.stem)
+        )
         if self.state.newest.recorder is None:
             try:
                 self._open(path)

@@ -7,6 +7,9 @@ from typing import Any, TypeAlias
 
 from app.intents import Intent
 
+QUIET = (84, 92, 102)
+"""Buttons that are not the first thing to do; on dark and light pages they look alive."""
+
 Send: TypeAlias = Callable[[Intent], None]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from app import intents
-from app.panels.base import Send, put
+from app.panels.base import QUIET, Send, put
 from app.state import State
 from app.words import _
 from handstudio.device.find import VIRTUAL, Found
@@ -28,13 +28,13 @@ class DevicePanel:
             hint=_("serial:/dev/ttyACM0, tcp:HOST:PORT or replay:TAKE.mcap"),
         )
         self._connect = gui.add_button(_("Connect"), icon=viser.Icon.PLUG_CONNECTED)
-        self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH, color="gray")
+        self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH, color=QUIET)
         self._facts = gui.add_markdown("")
         self._blink_choice = gui.add_dropdown(_("Sensor"), ("SN1",), visible=False)
         self._blink = gui.add_button(
             _("Blink this sensor"),
             icon=viser.Icon.BULB,
-            color="gray",
+            color=QUIET,
             hint=_("Its light on the glove blinks for three seconds"),
             visible=False,
         )

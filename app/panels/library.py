@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from app import intents
-from app.panels.base import Send, page_of, put, typed
+from app.panels.base import QUIET, Send, page_of, put, typed
 from app.panels.sheets import ask_deletion, ask_emptying
 from app.review import Review
 from app.state import Shelf, State
@@ -106,7 +106,8 @@ class LibraryPanel:
 
     def _words(self, state: State) -> str:
         if state.review is not None:
-            return _facts(state.review)
+            nothing = _shelf_words(state.shelf) if not state.shelf.found else ""
+            return "\n\n".join(filter(None, [nothing, _facts(state.review)]))
         entry = self._labels.get(self._choice.value)
         if entry is not None and entry.recording:
             return _("This take is being recorded.")
@@ -126,9 +127,9 @@ class NotesFolder:
             self._label = gui.add_text(
                 _("Name of the part"), "", hint=_("What happens between begin and end")
             )
-            self._name = gui.add_button(_("Name this part"), color="gray")
+            self._name = gui.add_button(_("Name this part"), color=QUIET)
             self._mark = gui.add_dropdown(_("Mark"), ("",), visible=False)
-            self._remove = gui.add_button(_("Remove this mark"), color="gray", visible=False)
+            self._remove = gui.add_button(_("Remove this mark"), color=QUIET, visible=False)
         self._marks: dict[str, float] = {}
         self._written = ""
         self._of: Path | None = None
@@ -173,16 +174,16 @@ class ShelfFolder:
         self._state: State | None = None
         with gui.add_folder(_("Keep tidy"), expand_by_default=False):
             self._name = gui.add_text(_("New name"), "")
-            self._rename = gui.add_button(_("Rename the take"), color="gray")
+            self._rename = gui.add_button(_("Rename the take"), color=QUIET)
             self._bin = gui.add_button(
-                _("Move to the bin"), icon=viser.Icon.TRASH, color="gray", hint=_("Key: Delete")
+                _("Move to the bin"), icon=viser.Icon.TRASH, color=QUIET, hint=_("Key: Delete")
             )
-            self._undo = gui.add_button(_("Undo"), icon=viser.Icon.ARROW_BACK_UP, color="gray")
+            self._undo = gui.add_button(_("Undo"), icon=viser.Icon.ARROW_BACK_UP, color=QUIET)
             self._binned = gui.add_dropdown(_("In the bin"), ("",), visible=False)
-            self._restore = gui.add_button(_("Put it back"), color="gray", visible=False)
-            self._empty = gui.add_button(_("Empty the bin"), color="gray", visible=False)
+            self._restore = gui.add_button(_("Put it back"), color=QUIET, visible=False)
+            self._empty = gui.add_button(_("Empty the bin"), color=QUIET, visible=False)
             self._delete = gui.add_button(
-                _("Delete a subject"), icon=viser.Icon.USER_X, color="gray", visible=False
+                _("Delete a subject"), icon=viser.Icon.USER_X, color=QUIET, visible=False
             )
         self._selected = selected
         self._keys: dict[str, str] = {}
@@ -209,7 +210,7 @@ class ShelfFolder:
             self._binned.options = options
         for handle in (self._binned, self._restore, self._empty):
             put(handle, visible=bool(binned))
-        empty = _("Empty the bin ({count} takes)").format(count=len(binned))
+        empty = _("Empty the bin ({count})").format(count=len(binned))
         put(self._empty, label=empty)
         put(self._delete, visible=bool(state.shelf.subjects))
 
@@ -244,8 +245,8 @@ def _shelf_words(shelf: Shelf) -> str:
     if not shelf.found:
         return _("No take has all these words.")
     if shelf.search.strip():
-        return _("{found} of {all} takes").format(found=len(shelf.found), all=len(shelf.takes))
-    return _("{all} takes").format(all=len(shelf.takes))
+        return _("Takes: {found} of {all}").format(found=len(shelf.found), all=len(shelf.takes))
+    return _("Takes: {all}").format(all=len(shelf.takes))
 
 
 def _facts(review: Review) -> str:

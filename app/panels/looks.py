@@ -8,7 +8,7 @@ import viser
 
 from app import intents
 from app.look import View
-from app.panels.base import Send, page_of, put, typed
+from app.panels.base import QUIET, Send, page_of, put, typed
 from app.state import State
 from app.words import LANGUAGES, _
 
@@ -46,7 +46,7 @@ class LooksPanel:
             self._diagnostics = gui.add_button(
                 _("Diagnostics"),
                 icon=viser.Icon.FILE_ZIP,
-                color="gray",
+                color=QUIET,
                 hint=_("A file for whoever helps; nothing of the people recorded is in it"),
             )
         self._panel.float(x=-16.0, y=16.0, width=236.0, height=250.0)

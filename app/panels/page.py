@@ -10,7 +10,7 @@ from viser._messages import HotkeyKey
 
 from app import intents, sounds
 from app.look import View
-from app.panels.base import Send, page_of, put
+from app.panels.base import QUIET, Send, page_of, put
 from app.panels.calibrate import CalibratePanel
 from app.panels.device import DevicePanel
 from app.panels.library import LibraryPanel
@@ -46,7 +46,7 @@ class Page:
         self._caption = gui.add_html("")
         self._work = gui.add_markdown("", visible=False)
         self._bar = gui.add_progress_bar(0.0, visible=False)
-        self._cancel = gui.add_button(_("Cancel"), color="gray", visible=False)
+        self._cancel = gui.add_button(_("Cancel"), color=QUIET, visible=False)
         self._cancel.on_click(lambda _event: send(intents.CancelWork()))
         self._button = RecordButton(gui, send)
         tabs = gui.add_tab_group()

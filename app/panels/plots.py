@@ -107,10 +107,10 @@ def _head(plot: Plot, dark: bool) -> str:
 
 
 def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
-    """Aligned data: time, the curves, and the playhead as a step from the lowest to the highest.
+    """Aligned data: time, the curves, and the playhead as a spike from the lowest to the highest.
 
-    The step's level parts lie on the frame of the plot and hold its limits still. Holes (NaN)
-    would upset the page's own ranging, so there are none.
+    It lies on the lower edge of the plot elsewhere, and its ends hold the plot's limits still.
+    Holes (NaN) would upset the page's own ranging, so there are none.
     """
     low, high = _limits(values)
     time_s, columns = curves.time_s, list(values.T)
@@ -119,8 +119,9 @@ def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
     thin = (curves.to_s - curves.from_s) * 1e-5
     edge = [max(now - thin, time_s[at - 1]), now + thin]
     columns = [np.insert(column, at, [column[at - 1]] * 2) for column in columns]
-    step = np.where(np.arange(len(time_s) + 2) <= at, low, high)
-    return (np.insert(time_s, at, edge), *columns, step)
+    spike = np.full(len(time_s) + 2, low)
+    spike[at : at + 2] = high
+    return (np.insert(time_s, at, edge), *columns, spike)
 
 
 def _limits(values: Array) -> tuple[float, float]:

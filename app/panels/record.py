@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from app import intents
-from app.panels.base import Send, page_of, put, typed
+from app.panels.base import QUIET, Send, page_of, put, typed
 from app.state import HAND_LENGTH_MM, State
 from app.views import recording as recording_view
 from app.words import _
@@ -60,6 +60,9 @@ class RecordingPanel:
         """Show the count before a take, or how it stands."""
         sheet = recording_view.sheet_of(state)
         put(self._panel, visible=bool(sheet))
+        put(
+            self._buttons, visible=state.countdown is None
+        )  # before a take there is nothing to mark
         if sheet:
             put(self._sheet, content=sheet)
 
@@ -160,7 +163,7 @@ def ask_subject(
             icon=viser.Icon.CHECK,
             color=RED if then_record else None,
         )
-        leave = gui.add_button(_("Cancel"), color="gray")
+        leave = gui.add_button(_("Cancel"), color=QUIET)
 
     def saved(_event: object) -> None:
         chosen = next(name for name, words in sides.items() if words == side.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from app import intents
-from app.panels.base import Send, typed
+from app.panels.base import QUIET, Send, typed
 from app.state import State
 from app.words import _, in_words
 from handstudio.errors import HandstudioError
@@ -26,7 +26,7 @@ def ask_deletion(client: viser.ClientHandle, send: Send, state: State) -> None:
         delete = gui.add_button(
             _("Delete for good"), icon=viser.Icon.TRASH, color="red", disabled=True
         )
-        leave = gui.add_button(_("Cancel"), color="gray")
+        leave = gui.add_button(_("Cancel"), color=QUIET)
 
     def chosen(code: str) -> None:
         what.content = _what_goes(state, code)
@@ -49,7 +49,7 @@ def ask_emptying(client: viser.ClientHandle, send: Send, count: int) -> None:
         words = _("{count} takes go for good. This cannot be taken back.").format(count=count)
         client.gui.add_markdown(words)
         empty = client.gui.add_button(_("Empty it"), icon=viser.Icon.TRASH, color="red")
-        leave = client.gui.add_button(_("Cancel"), color="gray")
+        leave = client.gui.add_button(_("Cancel"), color=QUIET)
 
     def emptied(_event: object) -> None:
         send(intents.EmptyBin())

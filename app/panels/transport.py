@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from app import intents
-from app.panels.base import Send, put, typed
+from app.panels.base import QUIET, Send, put, typed
 from app.review import SPEEDS, Review
 from app.state import State
 from app.views import timeline
@@ -45,7 +45,7 @@ class TransportPanel:
             )
             self._loop = gui.add_checkbox(_("Loop"), initial_value=False)
             self._live = gui.add_button(
-                _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color="gray"
+                _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
         self._panel.float(x=16.0, y=-16.0, width=440.0, height=330.0)
         self._playing = False

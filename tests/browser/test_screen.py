@@ -145,9 +145,9 @@ def test_the_library_is_kept_tidy(
         simulate(sessions, seconds=3.0, subject="S07", name=name)
     page = visit(start_studio())
     page.get_by_role("tab", name="Review").click()
-    expect(page.get_by_text("2 takes")).to_be_visible()
+    expect(page.get_by_text("Takes: 2")).to_be_visible()
     field(page, "Search").fill("grasp")
-    expect(page.get_by_text("1 of 2 takes")).to_be_visible()
+    expect(page.get_by_text("Takes: 1 of 2")).to_be_visible()
     choose(page, "grasp")
     expect(page.get_by_text("Replay · grasp")).to_be_visible()
 
@@ -162,7 +162,7 @@ def test_the_library_is_kept_tidy(
 
     field(page, "Search").fill("")
     button(page, "Move to the bin").click()
-    expect(page.get_by_text("Undo: pinch in the bin")).to_be_visible()
+    expect(page.get_by_text("Undo: moving pinch to the bin")).to_be_visible()
     assert not renamed.exists()
     page.get_by_text("Keep tidy").click(force=True)
     page.keyboard.press("Escape")

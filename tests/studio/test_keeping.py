@@ -50,6 +50,7 @@ def test_a_take_in_the_bin_is_closed_and_comes_back(studio: Studio, taken: Path)
     assert "reach" in state.shelf.undo
     state = after(studio, intents.Undo())
     assert [entry.path for entry in state.shelf.takes] == [taken]
+    assert state.review is not None  # it was open when it went
     assert after(studio, intents.Undo()).messages == ()  # nothing more
 
 
