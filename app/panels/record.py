@@ -60,9 +60,8 @@ class RecordingPanel:
         """Show the count before a take, or how it stands."""
         sheet = recording_view.sheet_of(state)
         put(self._panel, visible=bool(sheet))
-        put(
-            self._buttons, visible=state.countdown is None
-        )  # before a take there is nothing to mark
+        # before a take there is nothing to mark
+        put(self._buttons, visible=state.countdown is None)
         if sheet:
             put(self._sheet, content=sheet)
 
