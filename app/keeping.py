@@ -11,7 +11,8 @@ from app.state import HAND_LENGTH_MM, Shelf
 from app.words import _
 from handstudio.recording import bin as rubbish
 from handstudio.recording import deletion, housekeeping, library, subjects
-from handstudio.recording.notes import Notes, load_notes
+from handstudio.recording.naming import take_stem
+from handstudio.recording.notes import Notes
 from handstudio.recording.search import search
 from handstudio.recording.subjects import Subject
 
@@ -55,7 +56,7 @@ class Keeper:
 
     def bin(self, path: Path) -> str:
         """Put a take in the bin; what to say."""
-        name = path.name.removesuffix(".recording").removesuffix(".mcap")
+        name = take_stem(path)
         undo = rubbish.move_to_bin(self.sessions, path, datetime.now(UTC))
         self._remember(_("moving {name} to the bin").format(name=name), undo)
         return _("{name} is in the bin. Ctrl+Z takes it out again.").format(name=name)
@@ -86,15 +87,10 @@ class Keeper:
         self.refresh()
         return _("{count} takes are gone for good.").format(count=removed)
 
-    def write_notes(self, path: Path, notes: Notes) -> Notes:
+    def write_notes(self, path: Path, notes: Notes) -> None:
         """Store the notes of a take."""
         undo = housekeeping.edit_notes(path, notes)
         self._remember(_("notes of {name}").format(name=path.stem), undo)
-        return notes
-
-    def notes(self, path: Path) -> Notes:
-        """The notes of a take."""
-        return load_notes(path)
 
     def save_subject(self, typed: intents.SaveSubject) -> Subject:
         """A person as typed, new or known."""

@@ -37,20 +37,19 @@ class PageProbe:
 
     def _run(self) -> None:
         while not self._ended.wait(EVERY_S):
-            times = [asked_ms(client) for client in self._server.get_clients().values()]
+            times = [self._asked_ms(client) for client in self._server.get_clients().values()]
             answers = [ms for ms in times if ms is not None]
             self._tell(max(answers) if answers else None)
 
-
-def asked_ms(client: viser.ClientHandle) -> float | None:
-    """How long a page takes to answer [ms]; None where it does not."""
-    begun = time.monotonic()
-    try:
-        client.local_storage.get_item("handstudio", timeout=PATIENCE_S)
-    except TimeoutError:
-        return PATIENCE_S * 1e3
-    except RuntimeError:  # it was closed, or it keeps nothing, which it says as late as an answer
-        pass
-    if client.client_id not in client._viser_server.get_clients():
-        return None
-    return (time.monotonic() - begun) * 1e3
+    def _asked_ms(self, client: viser.ClientHandle) -> float | None:
+        """How long a page takes to answer [ms]; None where it does not."""
+        begun = time.monotonic()
+        try:
+            client.local_storage.get_item("handstudio", timeout=PATIENCE_S)
+        except TimeoutError:
+            return PATIENCE_S * 1e3
+        except RuntimeError:  # it was closed, or keeps nothing, which it says as late as an answer
+            pass
+        if client.client_id not in self._server.get_clients():
+            return None
+        return (time.monotonic() - begun) * 1e3

@@ -96,13 +96,15 @@ class Studio:
         if review is not None and review.playing:
             self.state = replace(self.state, review=reviewing.advanced(review, elapsed_s))
         self._face_once()
-        self.state = replace(self.state, shelf=self._keeper.shelf)
         self._keep_settings(elapsed_s)
         return self.state
 
     def refresh_takes(self) -> None:
         """Read the library again."""
         self._keeper.refresh()
+        self._take_shelf()
+
+    def _take_shelf(self) -> None:
         self.state = replace(self.state, shelf=self._keeper.shelf)
 
     # --- intents --------------------------------------------------------------------------------
@@ -116,6 +118,7 @@ class Studio:
                     self._move(item)
         except HandstudioError as error:
             self._say(error)
+        self._take_shelf()
 
     def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
         """Devices, recording, opening; False: it is about something else."""
@@ -178,6 +181,7 @@ class Studio:
                 self.capture.send(SetHand(self._hand()))
             case intents.SaveSubject(then_record=then_record):
                 saved = keeper.save_subject(intent)
+                self._take_shelf()
                 self._change(subject=saved.code)
                 self.capture.send(SetHand(self._hand()))
                 if then_record:
@@ -298,12 +302,11 @@ class Studio:
 
     def _hand(self) -> HandModel:
         """The hand of whoever is chosen now."""
-        state = replace(self.state, shelf=self._keeper.shelf)
-        return HandModel(hand_length_m=state.hand_length_mm * 1e-3)
+        return HandModel(hand_length_m=self.state.hand_length_mm * 1e-3)
 
     def _side(self) -> str:
         """Which hand a device sits on that does not know it."""
-        subject = replace(self.state, shelf=self._keeper.shelf).subject
+        subject = self.state.subject
         return (subject.side if subject is not None else "") or self.store.settings.side
 
     # --- recording ------------------------------------------------------------------------------
@@ -324,7 +327,7 @@ class Studio:
                 "There is no device to record from.", "Connect one under Device, then record."
             )
         settings = self.store.settings
-        if replace(self.state, shelf=self._keeper.shelf).subject is None:
+        if self.state.subject is None:
             self.state = replace(self.state, asking=page)
             return
         self._taker.begin(settings)
@@ -372,7 +375,7 @@ class Studio:
     def _show(self, review: Review) -> None:
         notes = noting.Notes()
         try:
-            notes = self._keeper.notes(review.take.path)
+            notes = noting.load_notes(review.take.path)
         except HandstudioError as error:
             self._say(error)
         self.state = replace(self.state, review=replace(review, notes=notes), yaw=None)
@@ -393,7 +396,7 @@ class Studio:
             self._reopen(review.take.path, path)
         review = self.state.review
         if review is not None and review.take.path == path:
-            notes = self._keeper.notes(path)
+            notes = noting.load_notes(path)
             self.state = replace(self.state, review=replace(review, notes=notes))
 
     def _write_notes(self, review: Review, notes: noting.Notes) -> None:
@@ -508,8 +511,7 @@ class Studio:
         """The language that was chosen, else that of the newest page, else the system's."""
         chosen = self.language or words.spoken([self.store.settings.language])
         language = chosen or words.spoken(languages) or words.system_language()
-        if language != self.state.language or not languages:
-            words.use_language(language)
+        words.use_language(language)
         self.state = replace(self.state, language=language)
 
     def _sound(self, sound: Sound) -> None:

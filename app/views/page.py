@@ -209,8 +209,8 @@ def _streaming(state: State) -> Status:
     word = _("Recording") if newest.recorder is not None else _("Connected")
     advice = worst_of(state)
     if advice is not None:
-        told = f"{advice.title}: {advice.remedy}" if advice.remedy else advice.title
-        return Status(word, figures_of(newest.health), told.replace("::", ":"), alarm=True)
+        told = f"{advice.title}: {advice.remedy}"
+        return Status(word, figures_of(newest.health), told, alarm=True)
     return Status(word, figures_of(newest.health), _shared(state), alarm=False)
 
 
