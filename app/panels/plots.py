@@ -114,8 +114,9 @@ def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
     """
     low, high = _limits(values)
     time_s, columns = curves.time_s, list(values.T)
-    now = curves.to_s if curves.now_s is None else curves.now_s
-    at = min(max(int(np.searchsorted(time_s, now)), 1), len(time_s))
+    # live, it stands at the newest instant: beyond it the curves would be drawn without data
+    now = float(time_s[-1]) if curves.now_s is None else curves.now_s
+    at = min(max(int(np.searchsorted(time_s, now, side="right")), 1), len(time_s))
     thin = (curves.to_s - curves.from_s) * 1e-5
     edge = [max(now - thin, time_s[at - 1]), now + thin]
     columns = [np.insert(column, at, [column[at - 1]] * 2) for column in columns]
