@@ -11,7 +11,7 @@ import pytest
 from handstudio import pipeline
 from handstudio.errors import LayoutError
 from handstudio.hand.angles import ROOT_ANGLES, hand_angles
-from handstudio.hand.skeleton import PARENTS, SEGMENTS, nominal_skeleton
+from handstudio.hand.skeleton import PARENTS, SEGMENTS
 from handstudio.kinematics import (
     angles_of,
     doubtful_segments,
@@ -27,8 +27,10 @@ from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.maths import so3
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import HandModel, Setup
-from handstudio.simulation.rig import Truth, World, signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.rig import Truth, signals
+from handstudio.simulation.subject import ideal_subject
+from handstudio.simulation.world import World
 
 RATE_HZ = 100.0
 sides = pytest.mark.parametrize("side", ["right", "left"])
@@ -36,7 +38,7 @@ sides = pytest.mark.parametrize("side", ["right", "left"])
 
 def true(layout: Layout, every_us: int = 100_000, until_us: int = 40_000_000) -> Truth:
     time_us = np.arange(0, until_us, every_us)
-    return signals(nominal_skeleton(layout.side), layout, showcase(layout.side), time_us)[1]
+    return signals(ideal_subject(layout.side), layout, showcase(layout.side), time_us)[1]
 
 
 def perfect(truth: Truth) -> Motion:
@@ -108,7 +110,7 @@ def test_the_order_of_the_sensors_in_a_layout_does_not_matter(side):
     columns = []
     for layout in (glove(side), glove(side, thumb_first)):
         setup, time_us = setup_of(layout), np.arange(0, 8_000_000, 10_000)
-        samples, _ = signals(nominal_skeleton(side), layout, showcase(side), time_us)
+        samples, _ = signals(ideal_subject(side), layout, showcase(side), time_us)
         motion, _ = pipeline.run(setup, pipeline.begin(setup), [samples])
         columns.append(angles_of(setup, motion, hand_angles()))
     assert np.isfinite(columns[0][-1]).all()

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from handstudio.errors import SetupError
-from handstudio.hand.skeleton import HandSide, nominal_skeleton
+from handstudio.hand.skeleton import HandSide
 from handstudio.health.record import TakeHealth
 from handstudio.health.watch import Watch
 from handstudio.layout import glove
@@ -23,8 +23,9 @@ from handstudio.recording.writer import TakeWriter
 from handstudio.setup import HandModel, Setup, for_device
 from handstudio.simulation.firmware import RATES_HZ, Firmware
 from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 from handstudio.stream import EventStream
 
 _STEP_US = 50_000  # of the glove's time in one chunk
@@ -109,8 +110,8 @@ def _write(
 
 
 def _save_truth(path: Path, side: HandSide, hand_length_m: float, clocks: np.ndarray) -> None:
-    layout, skeleton = glove(side), nominal_skeleton(side, hand_length_m)
-    _, truth = signals(skeleton, layout, showcase(side), clocks - clocks[0])
+    layout, subject = glove(side), ideal_subject(side, hand_length_m)
+    _, truth = signals(subject, layout, showcase(side), clocks - clocks[0])
     np.savez_compressed(
         truth_path(path),
         time_us=clocks,

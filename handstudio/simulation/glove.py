@@ -6,14 +6,15 @@ import numpy as np
 from jaxtyping import Int64
 
 from handstudio.arrays import Array
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide, nominal_skeleton
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
 from handstudio.layout import glove
 from handstudio.protocol.codec import VERSION
 from handstudio.protocol.packets import Description
 from handstudio.samples import STANDARD_GRAVITY
 from handstudio.simulation.imperfections import MPU9250, Readings, read, switched_on
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 from handstudio.simulation.trajectory import Trajectory
 
 SENSORS = tuple(range(1, 21))
@@ -34,14 +35,14 @@ class WornGlove:
         trajectory: Trajectory | None = None,
     ) -> None:
         self._layout = glove(side)
-        self._skeleton = nominal_skeleton(side, hand_length_m)
+        self._subject = ideal_subject(side, hand_length_m)
         self._trajectory = showcase(side) if trajectory is None else trajectory
         self._seed = seed
         self._state = switched_on(len(self._layout.sensors))
 
     def read(self, time_us: Int64[Array, " n"], rate_hz: int) -> Readings:
         """Read the next instants, given in time since the motion began [µs]."""
-        exact, _ = signals(self._skeleton, self._layout, self._trajectory, time_us)
+        exact, _ = signals(self._subject, self._layout, self._trajectory, time_us)
         readings, self._state = read(MPU9250, self._seed, rate_hz, self._state, exact)
         return readings
 

@@ -9,13 +9,17 @@ from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.errors import LayoutError
-from handstudio.hand.skeleton import SEGMENTS, Skeleton
+from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
 from handstudio.layout import Layout
 from handstudio.maths import so3
 
 # Bone centre to the chip, ours: half the thickness of an adult's segment and 3 mm of board.
 _HEIGHT_M = {"forearm": 0.025, "hand": 0.016, "hand_ulnar": 0.015, "thumb_metacarpal": 0.014}
 _HEIGHT_OF_PHALANX_M = {"proximal": 0.012, "intermediate": 0.011, "distal": 0.009}
+
+# How a glove sits on a person, on every donning; ours, judged by eye.
+_TILT_DEG = (4.0, 6.0, 4.0)  # about the segment's x, y and z: skin slopes, boards twist
+_SHIFT_M = (0.002, 0.003, 0.001)
 
 # Share of the segment's length; whatever is not named sits in the middle.
 _ALONG = {"SN1": 0.70, "SN2": 0.78, "SN3": 0.86, "Tip": 1.0}
@@ -43,6 +47,25 @@ def nominal_mounting(layout: Layout, skeleton: Skeleton) -> Mounting:
         height = np.array([0.0, 0.0, _height_m(place.segment)])
         places.append(_ALONG.get(place.sensor, 0.5) * far[segment] + height)
     return Mounting(np.tile(so3.IDENTITY, (len(places), 1)), np.array(places))
+
+
+def donned(nominal: Mounting, seed: int, side: HandSide, strength: float = 1.0) -> Mounting:
+    """A glove put on: every sensor a little turned and shifted; a seed is one donning.
+
+    A strength of 0 leaves all where the maker meant it, 2 is twice as crooked. The same donning on
+    the other hand is the mirror image.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_DONNING,)))
+    normal = strength * rng.standard_normal((len(nominal.t_segment_sensor), 6))
+    tilt, shift = np.deg2rad(_TILT_DEG) * normal[:, :3], np.asarray(_SHIFT_M) * normal[:, 3:]
+    if side == "left":
+        tilt, shift = tilt * [1.0, -1.0, -1.0], shift * [-1.0, 1.0, 1.0]
+    return Mounting(
+        so3.multiply(nominal.q_segment_sensor, so3.exp(tilt)), nominal.t_segment_sensor + shift
+    )
+
+
+_DONNING = 11  # which of a seed's streams
 
 
 def segment_indices(layout: Layout) -> list[int]:

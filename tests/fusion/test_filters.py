@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 from handstudio.errors import SetupError
 from handstudio.fusion.filter import Filter
-from handstudio.hand.skeleton import nominal_skeleton
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.samples import FULL_SCALE, STANDARD_GRAVITY, ImuSamples
 from handstudio.setup import FILTERS
 from handstudio.simulation.imperfections import MPU9250, read, switched_on
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 
 RATE_HZ = 200.0
 N = 300
@@ -35,7 +35,7 @@ def samples() -> ImuSamples:
     """Forearm, hand and a fingertip of a fist, as real sensors read it; compass at 100 Hz."""
     layout = glove("right", ["SN1", "SN11", "SN17"])
     time_us = 4_700_000 + np.arange(N) * 5000
-    exact, _ = signals(nominal_skeleton("right"), layout, showcase("right"), time_us)
+    exact, _ = signals(ideal_subject("right"), layout, showcase("right"), time_us)
     readings, _ = read(MPU9250, 3, 200, switched_on(SENSORS), exact)
     si, ranges = readings.counts / FULL_SCALE, MPU9250.ranges
     return replace(

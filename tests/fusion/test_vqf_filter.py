@@ -9,13 +9,13 @@ import pytest
 from vqf import VQF
 
 from handstudio.fusion.vqf_filter import VqfFilter
-from handstudio.hand.skeleton import nominal_skeleton
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.samples import ImuSamples
 from handstudio.simulation.imperfections import MPU9250, read, switched_on
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 
 Q_WORLD_ENU = so3.about_z(-0.5 * np.pi)  # the package's y points north, our x does
 
@@ -24,7 +24,7 @@ def showing(rate_hz: int, seconds: float = 4.0) -> tuple[ImuSamples, np.ndarray]
     """Two sensors of a hand that makes a fist, with errors of real ones, and their truth."""
     layout = glove("right", ["SN11", "SN16"])
     time_us = 3_500_000 + np.arange(round(seconds * rate_hz)) * (1_000_000 // rate_hz)
-    exact, truth = signals(nominal_skeleton("right"), layout, showcase("right"), time_us)
+    exact, truth = signals(ideal_subject("right"), layout, showcase("right"), time_us)
     readings, _ = read(MPU9250, 5, rate_hz, switched_on(2), exact)
     si, ranges = readings.counts / 32768, MPU9250.ranges
     samples = replace(

@@ -16,7 +16,8 @@ from handstudio.protocol.packets import ImuPacket, Missing, Packet, Status
 from handstudio.samples import Event, Ranges, from_packets
 from handstudio.setup import Setup, for_device
 from handstudio.simulation.glove import WornGlove, description
-from handstudio.simulation.showcase import Script, showcase, trajectory
+from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.postures import Script, scripted
 
 START_NS = 1_800_000_000_000_000_000
 DEVICE_US = 7_300_000  # the device's clock at the first instant: not on the edge of a window
@@ -86,7 +87,7 @@ def _performed(
     rate_hz: int, seconds: float, seed: int, motion: str
 ) -> tuple[Setup, Ranges, Array, Array, Array]:
     told = description("right", seed, rate_hz, epoch=1, name="glove")
-    played = showcase("right") if motion == "showcase" else trajectory(SCRIPTS[motion], "right")
+    played = showcase("right") if motion == "showcase" else scripted(SCRIPTS[motion], "right")
     time_us = np.arange(round(seconds * rate_hz)) * (1_000_000 // rate_hz)
     readings = WornGlove("right", seed, trajectory=played).read(time_us, rate_hz)
     setup = for_device(told, "handstudio-1")

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from handstudio.hand.skeleton import FINGERS, nominal_skeleton
+from handstudio.hand.skeleton import FINGERS
 from handstudio.layout import glove
 from handstudio.samples import FULL_SCALE, ImuSamples
 from handstudio.setup import Setup
 from handstudio.simulation.imperfections import MPU9250, read, switched_on
+from handstudio.simulation.postures import Script, scripted
 from handstudio.simulation.rig import Truth, signals
-from handstudio.simulation.showcase import Script, trajectory
+from handstudio.simulation.subject import ideal_subject
 
 RATE_HZ = 100.0
 PERIOD_US = 10_000
@@ -56,9 +57,9 @@ def perfect() -> Performance:
 
 
 def _performed(errors: int | None) -> Performance:
-    layout, skeleton = glove("right", SENSORS), nominal_skeleton("right")
+    layout, subject = glove("right", SENSORS), ideal_subject("right")
     time_us = np.arange(0, 7_000_000, PERIOD_US)
-    exact, truth = signals(skeleton, layout, trajectory(_SCRIPT, "right"), time_us)
+    exact, truth = signals(subject, layout, scripted(_SCRIPT, "right"), time_us)
     setup = Setup(layout, RATE_HZ, magnetometer_rate_hz=100.0)
     if errors == 0:
         return Performance(setup, exact, truth)

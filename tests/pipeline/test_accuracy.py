@@ -13,15 +13,15 @@ import pytest
 
 from handstudio import pipeline
 from handstudio.hand.angles import hand_angles
-from handstudio.hand.skeleton import nominal_skeleton
 from handstudio.kinematics import angles_of
 from handstudio.maths import so3
 from handstudio.protocol.packets import ImuPacket, Status
 from handstudio.samples import from_packets
 from handstudio.setup import Setup, for_device
 from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 
 
 def worn(side: str, seed: int, rate_hz: int, seconds: float) -> tuple[Setup, list, np.ndarray]:
@@ -48,7 +48,7 @@ def worn(side: str, seed: int, rate_hz: int, seconds: float) -> tuple[Setup, lis
 def test_angles_of_the_showcase_are_within_a_few_degrees_of_the_truth(side, seed, rate_hz, seconds):
     setup, events, time_us = worn(side, seed, rate_hz, seconds)
     motion, _ = pipeline.run(setup, pipeline.begin(setup), events)
-    _, truth = signals(nominal_skeleton(side), setup.layout, showcase(side), time_us)
+    _, truth = signals(ideal_subject(side), setup.layout, showcase(side), time_us)
     placed = (motion.doubt == 0).all(axis=1)
     assert np.argmax(placed) == rate_hz // 2 - 1
     assert placed[rate_hz // 2 :].all()

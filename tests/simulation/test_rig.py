@@ -5,14 +5,16 @@ import pytest
 
 from handstudio.errors import LayoutError
 from handstudio.hand.angles import joint_angles
-from handstudio.hand.skeleton import JOINTS, SEGMENTS, nominal_skeleton
+from handstudio.hand.skeleton import SEGMENTS, nominal_skeleton
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.mounting import Mounting, nominal_mounting
-from handstudio.simulation.rig import World, signals
-from handstudio.simulation.showcase import showcase
-from handstudio.simulation.trajectory import Trajectory
+from handstudio.simulation.rig import signals
+from handstudio.simulation.subject import ideal_subject, subject
+from handstudio.simulation.trajectory import CHANNELS, Trajectory, through_stops
+from handstudio.simulation.world import World
 
 STEP_US = 1000
 # central differences of order 8, of the instants from -4 to 4
@@ -20,13 +22,14 @@ FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -
 SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
 
 sides = pytest.mark.parametrize("side", ["right", "left"])
+people = pytest.mark.parametrize("number", [0, 3, 8])
 
 
 def thrashing() -> Trajectory:
     """All 54 turns at once, faster than a hand."""
-    turns = np.random.default_rng(2).uniform(-1.2, 1.2, size=(4, len(JOINTS), 3))
-    turns[0] = 0.0
-    return Trajectory(np.array([0.0, 0.6, 1.2, 1.8]), turns)
+    postures = np.random.default_rng(2).uniform(-1.2, 1.2, size=(4, CHANNELS))
+    postures[0] = 0.0
+    return through_stops(np.array([0.0, 0.6, 1.2, 1.8]), postures)
 
 
 def crooked(side: str) -> Mounting:
@@ -49,8 +52,9 @@ def within_one_blend() -> np.ndarray:
 
 
 @sides
-def test_gyroscopes_read_what_their_orientations_turn(side):
-    args = nominal_skeleton(side), glove(side), thrashing(), within_one_blend()
+@people
+def test_gyroscopes_read_what_their_orientations_turn(number, side):
+    args = subject(number, side), glove(side), thrashing(), within_one_blend()
     samples, truth = signals(*args, mounting=crooked(side))
     q_sensor_world = so3.conjugate(truth.q_world_sensor[4:-4])
     rate = so3.multiply(q_sensor_world, differences(truth.q_world_sensor, FIRST, 1))
@@ -60,14 +64,11 @@ def test_gyroscopes_read_what_their_orientations_turn(side):
 
 
 @sides
-def test_accelerometers_read_how_their_places_accelerate(side):
-    args = nominal_skeleton(side), glove(side), thrashing(), within_one_blend()
-    mounting = crooked(side)
-    samples, truth = signals(*args, mounting=mounting)
-    on = [SEGMENTS.index(place.segment) for place in glove(side).sensors]
-    lever = so3.rotate(truth.q_world_segment[:, on], mounting.t_segment_sensor)
-    t_world_sensor = truth.t_world_joint[:, on] + lever
-    lift = differences(t_world_sensor, SECOND, 2) + np.array([0.0, 0.0, STANDARD_GRAVITY])
+@people
+def test_accelerometers_read_how_their_places_accelerate(number, side):
+    args = subject(number, side), glove(side), thrashing(), within_one_blend()
+    samples, truth = signals(*args, mounting=crooked(side))
+    lift = differences(truth.t_world_sensor, SECOND, 2) + np.array([0.0, 0.0, STANDARD_GRAVITY])
     expected = so3.rotate(so3.conjugate(truth.q_world_sensor[4:-4]), lift)
     error = np.abs(samples.acc[4:-4] - expected).max()
     assert error < 1e-7 * np.abs(expected).max()
@@ -77,7 +78,7 @@ def test_accelerometers_read_how_their_places_accelerate(side):
 @pytest.mark.parametrize("heading_rad", [0.0, 0.6, -2.5])
 def test_at_rest_the_start_reads_gravity_and_the_field(side, heading_rad):
     world = World(heading_rad=heading_rad)
-    args = nominal_skeleton(side), glove(side), showcase(side), np.arange(0, 2_500_000, 10_000)
+    args = ideal_subject(side), glove(side), showcase(side), np.arange(0, 2_500_000, 10_000)
     samples, truth = signals(*args, world=world)
     np.testing.assert_array_equal(samples.gyr, 0.0)
     norms = np.linalg.norm(samples.acc, axis=-1)
@@ -92,25 +93,26 @@ def test_at_rest_the_start_reads_gravity_and_the_field(side, heading_rad):
     np.testing.assert_allclose(along, np.broadcast_to(pointing, along.shape), atol=1e-15)
 
 
-def test_a_left_hand_feels_the_mirror_image_of_a_right_one():
+@people
+def test_a_left_hand_feels_the_mirror_image_of_a_right_one(number):
     time_us = np.arange(4_000_000, 39_000_000, 50_000)
-    right, _ = signals(nominal_skeleton("right"), glove("right"), showcase("right"), time_us)
-    left, _ = signals(nominal_skeleton("left"), glove("left"), showcase("left"), time_us)
+    right, _ = signals(subject(number, "right"), glove("right"), showcase("right"), time_us)
+    left, _ = signals(subject(number, "left"), glove("left"), showcase("left"), time_us)
     np.testing.assert_allclose(left.acc, right.acc * [-1.0, 1.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(left.gyr, right.gyr * [1.0, -1.0, -1.0], atol=1e-12)
 
 
 @sides
 def test_true_angles_are_what_the_attitudes_of_the_segments_say(side):
-    skeleton, time_us = nominal_skeleton(side), np.arange(0, 40_000_000, 100_000)
-    _, truth = signals(skeleton, glove(side), showcase(side), time_us)
+    someone, time_us = subject(5, side), np.arange(0, 40_000_000, 100_000)
+    _, truth = signals(someone, glove(side), showcase(side), time_us)
     start = np.broadcast_to(World().q_world_start, (len(time_us), 4))
-    angles = joint_angles(skeleton, truth.q_world_segment, start)
+    angles = joint_angles(someone.skeleton, truth.q_world_segment, start)
     np.testing.assert_allclose(truth.angles, angles, atol=1e-12)
 
 
 def test_an_instant_reads_the_same_alone_and_among_others():
-    args = nominal_skeleton("right"), glove(), showcase("right")
+    args = ideal_subject("right"), glove(), showcase("right")
     time_us = np.arange(5_000_000, 6_000_000, 10_000)
     samples, _ = signals(*args, time_us)
     alone, _ = signals(*args, time_us[37:38])
@@ -132,4 +134,4 @@ def test_a_layout_that_is_no_hand_is_refused():
     joints = (JointPlace("hinge", "door", "frame", 1),)
     layout = Layout("unknown", (SensorPlace("A", "door"),), joints)
     with pytest.raises(LayoutError, match="A sits on door"):
-        signals(nominal_skeleton("right"), layout, showcase("right"), np.arange(1))
+        signals(ideal_subject("right"), layout, showcase("right"), np.arange(1))

@@ -1,0 +1,1 @@
+"""What a subject can do: motions by name, and the small language that puts them together."""

@@ -1,0 +1,22 @@
+"""Every motion there is, by name."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from handstudio.simulation.motions.actor import Actor, Motion
+from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.trajectory import Trajectory
+
+
+def _showcase(actor: Actor, _: str) -> Trajectory:
+    return showcase(actor.subject.side)
+
+
+SHOWCASE = (Motion("showcase", "What a hand can do, in forty seconds", _showcase),)
+
+
+@cache
+def motions() -> dict[str, Motion]:
+    """Motions by name, in the order they are told."""
+    return {motion.name: motion for motion in SHOWCASE}
