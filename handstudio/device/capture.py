@@ -46,6 +46,7 @@ from handstudio.protocol.packets import (
     ForeignVersion,
     Packet,
     Reply,
+    Result,
     Restart,
 )
 from handstudio.recording.header import Header
@@ -326,8 +327,21 @@ class Capture:
                 )
             case Reply():
                 self.newest = replace(self.newest, last_reply=packet)
+                self._hear_reply(packet)
             case _:
                 pass
+
+    def _hear_reply(self, reply: Reply) -> None:
+        """Tell what a person asked for and the device will not do; the rest is asked again."""
+        if reply.result is Result.OK or reply.command in _OUR_OWN:
+            return
+        self._reports.append(
+            DeviceError(
+                "The device will not do that: {why}.",
+                "Ask for something else.",
+                why=reply.text.rstrip(".") or reply.result.name,
+            )
+        )
 
     def _meet(self, description: Description, line: Line) -> None:
         """A device described itself: the first one, the same again, or another."""

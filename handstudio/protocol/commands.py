@@ -6,6 +6,12 @@ import struct
 
 from handstudio.protocol.packets import Command, Request
 
+PERFORM = 0xC0
+"""A virtual glove's own command: do this (README.md)."""
+
+LONGEST_PERFORMANCE = 255
+"""[bytes of UTF-8]"""
+
 _RATE = struct.Struct("<H")
 _BLINK = struct.Struct("<BH")
 
@@ -18,6 +24,26 @@ def set_rate(tag: int, rate_hz: int) -> Request:
 def blink(tag: int, sensor: int, duration_ms: int) -> Request:
     """Ask that the light of a sensor (by number) blinks; 0 ms ends it."""
     return Request(Command.BLINK, tag, _packed(_BLINK, sensor, duration_ms))
+
+
+def perform(tag: int, motions: str) -> Request:
+    """Ask a virtual glove that its wearer does this, from now on.
+
+    Raises:
+        ValueError: the description is longer than a command can be.
+    """
+    argument = motions.encode()
+    if len(argument) > LONGEST_PERFORMANCE:
+        raise ValueError(f"{len(argument)} bytes, at most {LONGEST_PERFORMANCE}")
+    return Request(PERFORM, tag, argument)
+
+
+def performance_asked(request: Request) -> str | None:
+    """The motions of a PERFORM; None when the argument is no text."""
+    try:
+        return request.argument.decode()
+    except UnicodeDecodeError:
+        return None
 
 
 def rate_asked(request: Request) -> int | None:

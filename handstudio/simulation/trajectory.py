@@ -66,6 +66,7 @@ class Trajectory:
         coefficients: Of powers of the time since the break before, highest first.
         spans: What is done when.
         periodic: It repeats after the last break, where it is as at the first.
+        begins_s: When the first break is, on the time axis that it is asked on [s].
 
     Raises:
         ValueError: breaks do not rise from 0, or a periodic motion does not close.
@@ -75,12 +76,12 @@ class Trajectory:
     coefficients: Float[Array, "6 m c"]
     spans: tuple[Span, ...] = ()
     periodic: bool = False
+    begins_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.breaks_s[0] != 0.0 or np.any(np.diff(self.breaks_s) <= 0.0):
             raise ValueError("Breaks must start at 0 s and each be later than the one before.")
-        ends = self.posture(np.array([0.0, self.duration_s]))
-        if self.periodic and not np.allclose(ends[0], ends[1], rtol=0.0, atol=1e-9):
+        if self.periodic and not np.allclose(self.start, self.end, rtol=0.0, atol=1e-9):
             raise ValueError("A periodic motion must end in the pose it began with.")
 
     @property
@@ -96,22 +97,19 @@ class Trajectory:
     @property
     def end(self) -> Float[Array, " c"]:
         """Posture it ends in."""
-        end: Array = self.posture(np.array([self.duration_s]))[0]
+        last = self.breaks_s[-1] - self.breaks_s[-2]
+        end: Array = last ** np.arange(DEGREE, -1.0, -1.0) @ self.coefficients[:, -1]
         return end
 
     def posture(self, time_s: Float[Array, " n"]) -> Float[Array, "n c"]:
         """All channels at any instants [s]."""
-        at, u = self._piece(time_s, within=False)
-        value: Array = self.coefficients[0, at]
-        for power in range(1, DEGREE + 1):
-            value = value * u + self.coefficients[power, at]
-        return value
+        return self.derivatives(time_s)[0]
 
     def derivatives(
         self, time_s: Float[Array, " n"]
     ) -> tuple[Float[Array, "n c"], Float[Array, "n c"], Float[Array, "n c"]]:
         """All channels and their first two derivatives at any instants [s]."""
-        at, u = self._piece(np.mod(time_s, self.duration_s) if self.periodic else time_s)
+        at, u = self._piece(time_s)
         c = self.coefficients[:, at]
         value, rate, half = c[0], np.zeros_like(c[0]), np.zeros_like(c[0])
         for power in range(1, DEGREE + 1):  # Horner's rule, carrying the derivatives along
@@ -131,9 +129,9 @@ class Trajectory:
             elbow=(value[:, -3:], rate[:, -3:], acceleration[:, -3:]),
         )
 
-    def _piece(self, time_s: Array, within: bool = True) -> tuple[Array, Array]:
-        if self.periodic and within:
-            time_s = np.mod(time_s, self.duration_s)
+    def _piece(self, time_s: Array) -> tuple[Array, Array]:
+        time_s = time_s - self.begins_s
+        time_s = np.mod(time_s, self.duration_s) if self.periodic else time_s
         time_s = np.clip(time_s, 0.0, self.duration_s)
         last = len(self.breaks_s) - 2
         at = np.clip(np.searchsorted(self.breaks_s, time_s, side="right") - 1, 0, last)
@@ -233,6 +231,16 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
             spans += [span.later(began) for span in piece.spans]
         end = part.end
     return Trajectory(np.concatenate(breaks), np.concatenate(coefficients, axis=1), tuple(spans))
+
+
+def turned_to(before: Trajectory, at_s: float, then: Trajectory) -> Trajectory:
+    """Leave off at an instant [s], without a jump, and go on to another motion.
+
+    On the same time axis, to be used from ``at_s`` on.
+    """
+    place, rate, acceleration = (x[0] for x in before.derivatives(np.array([at_s])))
+    going = way((place, rate, acceleration), then.start)
+    return replace(joined([going, then]), begins_s=at_s)
 
 
 def labelled(part: Trajectory, name: str) -> Trajectory:

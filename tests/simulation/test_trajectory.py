@@ -13,6 +13,7 @@ from handstudio.simulation.trajectory import (
     stretched,
     through_points,
     through_stops,
+    turned_to,
     way,
 )
 
@@ -145,3 +146,14 @@ def test_stretching_keeps_the_way_and_scaling_its_start():
     assert stretched(part, 3.0).spans[0].end_s == pytest.approx(6.9)
     away = scaled(part, 0.25).posture(time_s) - part.start
     np.testing.assert_allclose(away, 0.25 * (part.posture(time_s) - part.start), atol=1e-12)
+
+
+def test_leaving_off_for_another_motion_makes_no_jump():
+    before, then = wandering("points"), scaled(wandering("points"), 0.5)
+    after = turned_to(before, 0.7, then)
+    at = np.array([0.7])
+    for was, got in zip(before.derivatives(at), after.derivatives(at), strict=True):
+        np.testing.assert_allclose(got, was, atol=1e-9)
+    begins_s = after.begins_s + after.duration_s - then.duration_s
+    time_s = np.linspace(0.0, then.duration_s, 40)
+    np.testing.assert_allclose(after.posture(begins_s + time_s), then.posture(time_s), atol=1e-9)

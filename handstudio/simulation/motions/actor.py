@@ -100,9 +100,16 @@ class Motion:
         what: What is done, a sentence without its full stop.
         make: Performs it: the actor, and what stands behind the colon.
         argument: What stands behind the colon, for people; empty where nothing does.
+        example: Of what stands there; empty where it may be left out.
     """
 
     name: str
     what: str
     make: Callable[[Actor, str], Trajectory]
     argument: str = ""
+    example: str = ""
+
+    @property
+    def described(self) -> str:
+        """One way to ask for it."""
+        return f"{self.name}:{self.example}" if self.example else self.name
