@@ -35,6 +35,13 @@ class BlinkSensor:
 
 
 @dataclass(frozen=True, slots=True)
+class Perform:
+    """Let the wearer of the virtual glove do this."""
+
+    motions: str
+
+
+@dataclass(frozen=True, slots=True)
 class ChooseSubject:
     """Whose takes are recorded from now on; an empty code: nobody's yet."""
 
@@ -326,6 +333,7 @@ Intent: TypeAlias = (
     | ConnectDevice
     | DisconnectDevice
     | BlinkSensor
+    | Perform
     | ChooseSubject
     | SaveSubject
     | SetVisit

@@ -39,6 +39,7 @@ from handstudio.device.orders import (
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Window
 from handstudio.process import kept_motion
+from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
 from handstudio.recording import notes as noting
 from handstudio.recording.recovery import recover
@@ -134,6 +135,8 @@ class Studio:
                 self.state = replace(self.state, live=None, shaking=None)
             case intents.BlinkSensor(name=name):
                 self._blink(name)
+            case intents.Perform(motions=motions):
+                self.capture.send(Ask(PERFORM, motions.encode()))
             case intents.ToggleRecording(page=page):
                 self._toggle_recording(page)
             case intents.GoOn(page=page):

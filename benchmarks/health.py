@@ -23,7 +23,7 @@ from handstudio.samples import Ranges
 from handstudio.setup import for_device
 from handstudio.shell import out
 from handstudio.simulation.firmware import Firmware
-from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.glove import description, plain_glove
 from handstudio.stream import EventStream
 
 _ROOM = 1 << 24
@@ -72,7 +72,7 @@ def _tell(what: str, took_us: Array) -> None:
 
 
 def _chunks(told: Description, seed: int, seconds: float) -> Iterator[tuple[int, bytes]]:
-    glove = Firmware(told, WornGlove("right", seed).read, _ROOM)
+    glove = Firmware(told, plain_glove("right", seed).read, _ROOM)
     glove.receive(encode(Request(Command.START, 0)))
     for now_us in range(0, round(seconds * 1e6) + 1, max(_PACE_US, 1_000_000 // told.rate_hz)):
         glove.advance(now_us)

@@ -17,20 +17,20 @@ import msgspec
 import tyro
 
 from handstudio.commands import keeping
+from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.export.csv import Content, Window, export_csv
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.health.record import TakeHealth
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
 from handstudio.recording.raw_import import import_folder
 from handstudio.recording.recovery import recover as recover_file
-from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import health_of_take
@@ -268,37 +268,6 @@ def recover(file: Annotated[Path, tyro.conf.Positional], *, json: Json = False) 
     return 0
 
 
-def simulate(
-    *,
-    seconds: float = 40.0,
-    rate: int = 100,
-    seed: int = 0,
-    side: HandSide = "right",
-    hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
-    out_folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None,
-) -> int:
-    """Write a take of the virtual glove's showcase, and the truth beside it.
-
-    Args:
-        seconds: How long; one round of the showcase takes 40.
-        rate: Samples a second.
-        seed: Which glove: its sensors' errors.
-        side: Which hand.
-        hand_length_mm: Wrist crease to the tip of the middle finger.
-        out_folder: Folder of the takes (default: as the studio's).
-    """
-    path = simulate_take(
-        library.sessions_folder(out_folder),
-        seconds=seconds,
-        rate_hz=rate,
-        seed=seed,
-        side=side,
-        hand=_hand(hand_length_mm),
-    )
-    out.print(str(path))
-    return 0
-
-
 def diagnostics(*, output: Path | None = None, sessions: Sessions = None) -> int:
     """Write a file for whoever helps when something does not work; it says nothing of subjects.
 
@@ -346,7 +315,8 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "export": export,
     "import": import_,
     "recover": recover,
-    "simulate": simulate,
+    "simulate": virtual_commands.simulate,
+    "motions": virtual_commands.motions,
     "takes": keeping.takes,
     "rename": keeping.rename,
     "bin": keeping.bin,

@@ -22,7 +22,7 @@ from handstudio.protocol.codec import encode
 from handstudio.protocol.decoder import V1Decoder
 from handstudio.protocol.packets import ImuPacket
 from handstudio.recording.header import Header, Summary
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import FirstState, Take, open_take, pack_first_state
 from handstudio.recording.writer import TakeWriter
 from handstudio.samples import STANDARD_GRAVITY, ImuSamples
@@ -33,7 +33,7 @@ from handstudio.stream import EventStream
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
     """Three seconds of a virtual glove."""
-    return simulate(tmp_path_factory.mktemp("recorded"), seconds=3.0, seed=3)
+    return simulate(tmp_path_factory.mktemp("recorded"), rehearse(seed=3), seconds=3.0)
 
 
 @pytest.fixture

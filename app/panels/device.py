@@ -6,8 +6,10 @@ import viser
 
 from app import intents
 from app.panels.base import QUIET, Send, put
+from app.panels.virtual import VirtualPanel
 from app.state import State
 from app.words import _
+from handstudio.device.addresses import is_virtual
 from handstudio.device.find import VIRTUAL, Found
 from handstudio.device.orders import Phase
 
@@ -20,8 +22,9 @@ class DevicePanel:
         self._addresses: dict[str, str] = {}
         self._wanted = state.settings.last_address  # to be shown as chosen once it is found
         self._choice = gui.add_dropdown(
-            _("Device"), (_("Virtual glove (showcase)"),), hint=_("Devices that were found")
+            _("Device"), (_("Virtual glove"),), hint=_("Devices that were found")
         )
+        self._virtual = VirtualPanel(gui, send, self._wanted)
         self._address = gui.add_text(
             _("or address"),
             self._wanted if self._wanted.startswith(("tcp:", "replay:")) else "",
@@ -55,6 +58,10 @@ class DevicePanel:
         put(self._connect, label=_("Disconnect") if self._connected else _("Connect"))
         put(self._choice, disabled=self._connected)
         put(self._address, disabled=self._connected)
+        there = is_virtual(newest.address) if self._connected else False
+        unheard = not self._connected and not self._address.value.strip()
+        chosen = unheard and is_virtual(self._addresses.get(self._choice.value, ""))
+        self._virtual.render(chosen=there or chosen, connected=there)
         looking = _("Looking …") if state.searching else _("Look for devices")
         put(self._find, label=looking, disabled=state.searching)
         self._render_facts(state)
@@ -62,7 +69,9 @@ class DevicePanel:
     def _choose_the_last(self) -> None:
         """The device of the time before, where it is there; once, as choosing is the person's."""
         for label, address in self._addresses.items():
-            if address == self._wanted:
+            if address == self._wanted or (
+                self._wanted.startswith(address) and is_virtual(address)
+            ):
                 self._wanted = ""
                 put(self._choice, value=label)
 
@@ -71,6 +80,8 @@ class DevicePanel:
             self._send(intents.DisconnectDevice())
             return
         address = self._address.value.strip() or self._addresses.get(self._choice.value, "virtual:")
+        if address == VIRTUAL.address:
+            address = self._virtual.address
         self._send(intents.ConnectDevice(address))
 
     def _render_facts(self, state: State) -> None:
@@ -86,7 +97,7 @@ class DevicePanel:
 
 
 def _label(found: Found) -> str:
-    return _("Virtual glove (showcase)") if found == VIRTUAL else found.label
+    return _("Virtual glove") if found == VIRTUAL else found.label
 
 
 def _facts(state: State) -> str:

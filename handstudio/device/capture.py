@@ -46,8 +46,8 @@ from handstudio.protocol.packets import (
     ForeignVersion,
     Packet,
     Reply,
-    Result,
     Restart,
+    Result,
 )
 from handstudio.recording.header import Header
 from handstudio.recording.take import FirstState, pack_first_state
@@ -62,6 +62,7 @@ REOPEN_S = 2.0  # a line without a byte is opened anew after this
 RETRY_S = 0.25  # between attempts to reach a lost device
 INTRODUCTION_S = 4.0  # a device that has not described itself by then is not one of ours
 HISTORY = 2000  # motions kept for `drain`
+_OUR_OWN = (Command.DESCRIBE, Command.START, Command.STOP)  # asked by us, not by a person
 
 
 @dataclass
@@ -339,7 +340,7 @@ class Capture:
             DeviceError(
                 "The device will not do that: {why}.",
                 "Ask for something else.",
-                why=reply.text.rstrip(".") or reply.result.name,
+                why=reply.text.rstrip(".") or Result(reply.result).name,
             )
         )
 

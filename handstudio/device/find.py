@@ -32,8 +32,8 @@ class Found:
         return self.description is not None
 
 
-VIRTUAL = Found("virtual:", "Virtual glove (showcase)")
-"""Always there: a process that speaks the protocol and plays a showcase."""
+VIRTUAL = Found("virtual:", "Virtual glove")
+"""Always there: a process that speaks the protocol, worn by a virtual person."""
 
 
 def ports() -> list[Found]:

@@ -18,17 +18,27 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.errors import HandstudioError
+from handstudio.protocol.packets import Result
+from handstudio.recording.material import material
+from handstudio.recording.simulated import Rehearsed, described, rehearse
 from handstudio.simulation.firmware import RATES_HZ, Firmware
-from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.glove import Wire, WornGlove
+from handstudio.simulation.imperfections.strengths import parse
+from handstudio.simulation.motions.actor import Actor
+from handstudio.simulation.motions.language import parse as parsed
+from handstudio.simulation.motions.language import perform
 
 _LONGEST_PAUSE_S = 0.1  # how long an order to stop may go unseen
 _SHORTEST_PAUSE_S = 0.001  # a USB device is asked once a millisecond too
 _RETRY_S = 0.002  # with a full line
+_FASTEST = 4.0
 _CATCH_UP = 100  # instants made in one go before the line is listened to again
 
 
@@ -51,15 +61,16 @@ class Line(Protocol):
         """Leave nothing behind."""
 
 
-def serve(line: Line, firmware: Firmware, stop: threading.Event) -> None:
+def serve(line: Line, firmware: Firmware, stop: threading.Event, speed: float = 1.0) -> None:
     """Move bytes between a line and a firmware, in real time, until told to stop.
 
-    Whatever is due is made, however late: the firmware's clock keeps pace with ours.
+    Whatever is due is made, however late: the firmware's clock keeps pace with ours, or with
+    ``speed`` times ours, for tests.
     """
     began_ns = time.monotonic_ns()
 
     def now_us() -> int:
-        return (time.monotonic_ns() - began_ns) // 1000
+        return int((time.monotonic_ns() - began_ns) * speed) // 1000
 
     while not stop.is_set():
         # each instant is offered to the line before the next is made: the device would have sent
@@ -76,7 +87,7 @@ def serve(line: Line, firmware: Firmware, stop: threading.Event) -> None:
         else:
             firmware.receive(heard)
         _send(line, firmware)
-        line.wait(_pause_s(firmware, now_us()))
+        line.wait(_pause_s(firmware, now_us(), speed))
 
 
 def _send(line: Line, firmware: Firmware) -> None:
@@ -84,8 +95,8 @@ def _send(line: Line, firmware: Firmware) -> None:
         firmware.taken(size)
 
 
-def _pause_s(firmware: Firmware, now_us: int) -> float:
-    until_due = (firmware.next_due_us - now_us) * 1e-6
+def _pause_s(firmware: Firmware, now_us: int, speed: float) -> float:
+    until_due = (firmware.next_due_us - now_us) * 1e-6 / speed
     longest = _RETRY_S if firmware.outgoing else _LONGEST_PAUSE_S
     return min(max(until_due, _SHORTEST_PAUSE_S), longest)
 
@@ -99,14 +110,63 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if asked.quit_with_parent:
         threading.Thread(target=_stop_at_end_of_input, args=(stop,), daemon=True).start()
     epoch = secrets.randbits(32) if asked.epoch is None else asked.epoch
-    firmware = Firmware(
-        description(asked.side, asked.seed, asked.rate, epoch, asked.name),
-        WornGlove(asked.side, asked.seed, asked.hand_length).read,
-        asked.tx_buffer,
-    )
+    try:
+        rehearsed = rehearse(
+            asked.subject,
+            asked.motion,
+            parse(asked.imperfections),
+            asked.seed,
+            side=asked.side,
+            hand_length_m=asked.hand_length,
+        )
+    except HandstudioError as error:
+        print(json.dumps({"problem": [str(error.what), str(error.remedy)]}), flush=True)
+        raise SystemExit(1) from error
+    worn = WornGlove(rehearsed.worn, rehearsed.trajectory)
+    told = described(rehearsed.subject, asked.seed, asked.rate, epoch)
+    told = replace(told, name=asked.name) if asked.name else told
+    wire = Wire(rehearsed.imperfections, rehearsed.seed)
+    wearer = Wearer(rehearsed, worn)
+    firmware = Firmware(told, worn.read, asked.tx_buffer, performer=wearer.asked, wire=wire.carry)
     with closing(_open(asked)) as line:
         print(json.dumps({"address": line.address}), flush=True)
-        serve(line, firmware, stop)
+        serve(line, firmware, stop, asked.speed)
+
+
+class Wearer:
+    """Does what it is asked, in a thread: thinking about how to write a word takes seconds."""
+
+    _AT_ONCE_S = 0.02  # what is thought of by then is told with the reply
+
+    def __init__(self, rehearsed: Rehearsed, worn: WornGlove) -> None:
+        self._rehearsed, self._worn = rehearsed, worn
+        self._thinking = ThreadPoolExecutor(1, thread_name_prefix="wearer")
+        self._thought: Future[float] | None = None
+        self._times = 0
+
+    def asked(self, text: str) -> tuple[Result, str]:
+        """Begin to do what the text says; the answer for the host."""
+        if self._thought is not None and not self._thought.done():
+            return Result.BUSY, "still thinking about the last one"
+        try:
+            parsed(text)
+        except HandstudioError as error:
+            return Result.BAD_ARGUMENT, str(error)
+        self._times += 1
+        self._thought = self._thinking.submit(self._perform, text, f"asked {self._times}")
+        try:
+            return Result.OK, f"{self._thought.result(self._AT_ONCE_S):.1f} s"
+        except TimeoutError:
+            return Result.OK, "thinking"
+        except HandstudioError as error:
+            return Result.BAD_ARGUMENT, str(error)
+
+    def _perform(self, motion: str, place: str) -> float:
+        rehearsed = self._rehearsed
+        actor = Actor(rehearsed.subject, rehearsed.seed, material(), place)
+        trajectory = perform(motion, actor)
+        self._worn.turn_to(trajectory)
+        return trajectory.duration_s
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -122,12 +182,23 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", type=int, default=0, help="which glove: its noise and biases")
     parser.add_argument("--side", choices=("left", "right"), default="right")
-    parser.add_argument("--hand-length", type=float, default=ADULT_HAND_LENGTH_M, help="[m]")
+    parser.add_argument("--subject", type=int, default=0, help="number of a person; 0: ideal")
+    parser.add_argument("--motion", default="showcase", help="see handstudio motions")
+    parser.add_argument("--imperfections", default="plain", help="ideal, plain, typical, harsh ...")
+    parser.add_argument("--hand-length", type=float, help="[m], of the ideal person")
+    parser.add_argument("--speed", type=_speed, default=1.0, help="of its clock, for tests: to 4")
     parser.add_argument("--tx-buffer", type=int, default=4096, help="[bytes]")
-    parser.add_argument("--name", default="Virtual glove")
+    parser.add_argument("--name", default="", help="instead of who wears it")
     parser.add_argument("--epoch", type=int, help="of this start; random unless given")
     parser.add_argument("--quit-with-parent", action="store_true", help="stop at end of input")
     return parser
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0.1 <= speed <= _FASTEST:
+        raise argparse.ArgumentTypeError(f"from 0.1 to {_FASTEST:g}")
+    return speed
 
 
 def _open(asked: argparse.Namespace) -> Line:

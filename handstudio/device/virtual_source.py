@@ -12,6 +12,8 @@ from handstudio.device.serial_source import SerialSource
 from handstudio.device.source import ByteSource, SourceLost
 from handstudio.device.tcp_source import TcpSource
 from handstudio.errors import DeviceError
+from handstudio.simulation.imperfections.strengths import parse as parse_imperfections
+from handstudio.simulation.motions.language import parse as parse_motions
 
 START_S = 20.0
 """How long a virtual glove may take to start on a busy machine."""
@@ -19,15 +21,26 @@ START_S = 20.0
 _TX_BUFFER = 1 << 18
 """Of our own glove [bytes]: rides out 0.6 s at 1000 Hz of a machine that a browser keeps busy."""
 
-_OPTIONS = ("rate", "seed", "side", "hand-length", "name", "epoch")
+_OPTIONS = (
+    "subject",
+    "motion",
+    "imperfections",
+    "rate",
+    "seed",
+    "side",
+    "hand-length",
+    "name",
+    "epoch",
+    "speed",
+)
 
 
 class VirtualSource:
     """Starts a virtual glove and speaks with it through a pseudo-terminal, or TCP on Windows.
 
     Args:
-        options: Any of rate, seed, side, hand-length, name, as the glove's command line takes
-            them; ``transport=tcp`` asks for TCP.
+        options: Any that the glove's command line takes, such as subject, motion, imperfections,
+            rate, seed, side; ``transport=tcp`` asks for TCP.
     """
 
     def __init__(self, options: dict[str, str]) -> None:
@@ -75,6 +88,8 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
             unknown=", ".join(sorted(unknown)),
             options=", ".join(_OPTIONS),
         )
+    parse_motions(options.get("motion", "showcase"))
+    parse_imperfections(options.get("imperfections", "plain"))
     tcp = options.get("transport") == "tcp" or sys.platform == "win32"
     command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--quit-with-parent"]
     command += ["--tx-buffer", str(_TX_BUFFER)]
@@ -114,7 +129,11 @@ def _address(process: subprocess.Popen[str]) -> str:
     finally:
         watchdog.cancel()
     try:
-        address = json.loads(line)["address"]
+        told = json.loads(line)
+        if "problem" in told:
+            what, remedy = told["problem"]
+            raise DeviceError("{what}", "{remedy}", what=what, remedy=remedy)
+        address = told["address"]
     except (ValueError, KeyError, TypeError) as error:
         raise DeviceError(
             "The virtual glove did not start (it said {line!r}).",

@@ -1,76 +1,192 @@
-"""Takes of a virtual glove, written without waiting, with the truth in a file beside them.
-
-The truth never reaches the pipeline: comparisons read it, nothing else does.
-"""
+"""Takes of a virtual glove, written without waiting, with the truth in a file beside them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
+from handstudio.arrays import Array
 from handstudio.errors import SetupError
-from handstudio.hand.skeleton import HandSide
-from handstudio.health.record import TakeHealth
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
 from handstudio.health.watch import Watch
 from handstudio.layout import glove
 from handstudio.protocol.codec import encode
-from handstudio.protocol.packets import Command, ImuPacket, Request
+from handstudio.protocol.packets import (
+    Command,
+    Corruption,
+    Description,
+    ImuPacket,
+    Missing,
+    Request,
+)
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.library import new_take_path
+from handstudio.recording.material import material
+from handstudio.recording.notes import Label, Notes, save_notes
+from handstudio.recording.truth import TruthFile, save_truth
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import HandModel, Setup, for_device
-from handstudio.simulation.firmware import RATES_HZ, Firmware
-from handstudio.simulation.glove import WornGlove, description
-from handstudio.simulation.motions.showcase import showcase
-from handstudio.simulation.rig import signals
-from handstudio.simulation.subject import ideal_subject
+from handstudio.simulation.firmware import RATES_HZ, Firmware, Readings
+from handstudio.simulation.glove import Wire, description
+from handstudio.simulation.imperfections.strengths import PLAIN, Imperfections, tell
+from handstudio.simulation.motions.actor import Actor
+from handstudio.simulation.motions.language import perform
+from handstudio.simulation.rig import Truth
+from handstudio.simulation.subject import Subject, ideal_subject
+from handstudio.simulation.subject import subject as virtual_subject
+from handstudio.simulation.trajectory import Trajectory
+from handstudio.simulation.worn import Worn, begin, sense, wear
 from handstudio.stream import EventStream
 
 _STEP_US = 50_000  # of the glove's time in one chunk
+_READ_AHEAD = 1000  # instants
 _ROOM = 1 << 24  # bytes: an offline line drops nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rehearsed:
+    """All that decides a simulated take: who, doing what, with which glove."""
+
+    subject: Subject
+    motion: str
+    trajectory: Trajectory
+    worn: Worn
+    imperfections: Imperfections
+    seed: int
+
+
+def rehearse(
+    person: int = 0,
+    motion: str = "showcase",
+    imperfections: Imperfections = PLAIN,
+    seed: int = 0,
+    *,
+    side: HandSide = "right",
+    hand_length_m: float | None = None,
+) -> Rehearsed:
+    """Put a glove on somebody who knows what to do.
+
+    Args:
+        person: Number of a virtual subject; 0 is the ideal one.
+        motion: In the language of motions.
+        imperfections: Of sensors, skin and room.
+        seed: Of this performance, this donning, this noise.
+        side: Which hand.
+        hand_length_m: Of the ideal subject; others have their own.
+
+    Raises:
+        SetupError: these are no motions, or this person cannot do them.
+    """
+    if person == 0:
+        subject = ideal_subject(side, hand_length_m or ADULT_HAND_LENGTH_M)
+    else:
+        subject = virtual_subject(person, side)
+    trajectory = perform(motion, Actor(subject, seed, material()))
+    worn = wear(subject, glove(side), imperfections, seed)
+    return Rehearsed(subject, motion, trajectory, worn, imperfections, seed)
 
 
 def simulate(
     sessions: Path,
+    rehearsed: Rehearsed | None = None,
     *,
-    seconds: float,
+    seconds: float | None = None,
     rate_hz: int = 100,
-    seed: int = 0,
-    side: HandSide = "right",
-    hand: HandModel | None = None,
-    subject: str = "virtual",
-    name: str = "showcase",
+    code: str = "",
+    name: str = "",
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Path:
-    """Write a take of the showcase, and its truth.
+    """Write a take, its truth and its labels.
+
+    Args:
+        sessions: Folder of the takes.
+        rehearsed: What happens; the ideal subject's showcase unless told.
+        seconds: How long; as long as the motion lasts unless told.
+        rate_hz: Samples a second.
+        code: Of the subject; ``virtual-NUMBER`` unless told.
+        name: Of the take; as the motion unless told.
+        progress: Told the share that is done.
 
     Raises:
         SetupError: no glove has this rate, or there is no time to simulate.
         TakeError: the take cannot be written.
     """
+    rehearsed = rehearsed or rehearse()
+    trajectory = rehearsed.trajectory
+    seconds = trajectory.duration_s if seconds is None else seconds
     _refuse(seconds, rate_hz)
-    hand = hand or HandModel()
-    told = description(side, seed, rate_hz, epoch=seed + 1, name="Virtual glove")
+    subject = rehearsed.subject
+    told = described(subject, rehearsed.seed, rate_hz, rehearsed.seed + 1)
     start = datetime.now(UTC)
+    code = code or f"virtual-{subject.number}"
+    path = new_take_path(sessions, code, name or rehearsed.motion, start)
+    setup = for_device(told, "handstudio-1", HandModel(hand_length_m=subject.hand_length_m))
     start_ns = int(start.timestamp() * 1e9)
-    path = new_take_path(sessions, subject, name, start)
-    setup = for_device(told, "handstudio-1", hand)
-    worn = WornGlove(side, seed, hand.hand_length_m)
-    writer = TakeWriter(path, Header(path.stem, subject, start_ns, setup, "wire", "simulated"))
+    writer = TakeWriter(path, Header(path.stem, code, start_ns, setup, "wire", "simulated"))
     try:
-        clocks, health = _write(writer, Firmware(told, worn.read, _ROOM), setup, seconds, start_ns)
-        count = len(clocks)
-        writer.close(Summary(writer.chunks, writer.bytes, seconds, packets=count, health=health))
-    finally:
-        writer.abandon()
-    _save_truth(path, side, hand.hand_length_m, clocks)
+        heard = _Listener(setup, start_ns)
+        truths = _write(writer, told, rehearsed, seconds, heard=heard, progress=progress)
+        save_truth(path, _truth_file(rehearsed, setup, truths, seconds))
+        writer.close(heard.summary(seconds))
+    except BaseException:
+        writer.discard()  # it can be simulated again
+        raise
+    labels = tuple(
+        Label(span.start_s, min(span.end_s, seconds), span.name)
+        for span in sorted(trajectory.spans, key=lambda span: span.start_s)
+        if span.start_s < seconds
+    )
+    if labels:
+        save_notes(path, Notes(labels=labels))
     return path
 
 
-def truth_path(take: Path) -> Path:
-    """Where the truth of a simulated take lives."""
-    return take.with_suffix(".truth.npz")
+def described(subject: Subject, seed: int, rate_hz: int, epoch: int) -> Description:
+    """How a virtual glove on this person describes itself."""
+    length_mm = subject.hand_length_m * 1e3
+    name = f"Virtual glove on person {subject.number}, hand {length_mm:.0f} mm"
+    return description(
+        subject.side, seed, rate_hz, epoch, name if subject.number else "Virtual glove"
+    )
+
+
+class _Listener:
+    """What a host would have made of the bytes: the summary of the take."""
+
+    def __init__(self, setup: Setup, start_ns: int) -> None:
+        self._stream, self._watch = EventStream("handstudio-1", setup.ranges), Watch()
+        self._start_ns = start_ns
+        self._packets = self._missing = self._damaged = 0
+        self._watch.begin(setup)
+        self._watch.begin_take()
+
+    def hear(self, now_us: int, chunk: bytes) -> int:
+        """Decode what came at this time of the device; returns the host's time [ns]."""
+        arrival_ns = self._start_ns + now_us * 1000
+        packets, events = self._stream.feed(chunk, arrival_ns)
+        self._watch.note(packets, events, arrival_ns)
+        for packet in packets:
+            match packet:
+                case ImuPacket():
+                    self._packets += 1
+                case Missing(count=count):
+                    self._missing += count
+                case Corruption():
+                    self._damaged += 1
+                case _:
+                    pass
+        return arrival_ns
+
+    def summary(self, seconds: float) -> Summary:
+        """Of the whole take; the writer knows its chunks and bytes."""
+        health = self._watch.end_take()
+        found = (self._packets, self._missing, self._damaged)
+        return Summary(0, 0, seconds, *found, health=health)
 
 
 def _refuse(seconds: float, rate_hz: int) -> None:
@@ -89,36 +205,73 @@ def _refuse(seconds: float, rate_hz: int) -> None:
 
 
 def _write(
-    writer: TakeWriter, glove: Firmware, setup: Setup, seconds: float, start_ns: int
-) -> tuple[np.ndarray, TakeHealth | None]:
-    """Let the glove perform; returns the device clock of every instant [µs], and the health."""
-    stream, clocks, watch = EventStream("handstudio-1", setup.ranges), list[int](), Watch()
-    watch.begin(setup)
-    watch.begin_take()
-    glove.receive(encode(Request(Command.START, 0)))
-    for now_us in range(0, round(seconds * 1e6) + 1, _STEP_US):
-        glove.advance(now_us)
-        chunk = bytes(glove.outgoing)
-        glove.taken(len(chunk))
+    writer: TakeWriter,
+    told: Description,
+    rehearsed: Rehearsed,
+    seconds: float,
+    *,
+    heard: _Listener,
+    progress: Callable[[float], None],
+) -> list[Truth]:
+    """Let the glove perform; returns what was true."""
+    truths: list[Truth] = []
+    state = begin(rehearsed.worn)
+
+    def read(time_us: Array, rate_hz: int) -> Readings:
+        nonlocal state
+        sensed, state = sense(rehearsed.worn, state, rehearsed.trajectory, time_us, rate_hz)
+        truths.append(sensed.truth)
+        return Readings(sensed.counts, sensed.fresh, sensed.answering, sensed.celsius[-1])
+
+    wire = Wire(rehearsed.imperfections, rehearsed.seed)
+    device = Firmware(told, read, _ROOM, wire=wire.carry, read_ahead=_READ_AHEAD)
+    device.receive(encode(Request(Command.START, 0)))
+    end_us = round(seconds * 1e6)
+    for now_us in range(0, end_us + _STEP_US, _STEP_US):
+        device.advance(min(now_us, end_us))
+        chunk = device.outgoing
+        device.taken(len(chunk))
         if chunk:
-            arrival_ns = start_ns + now_us * 1000
-            writer.write(arrival_ns, chunk)
-            packets, events = stream.feed(chunk, arrival_ns)
-            watch.note(packets, events, arrival_ns)
-            clocks += [packet.clock_us for packet in packets if isinstance(packet, ImuPacket)]
-    return np.array(clocks, dtype=np.int64), watch.end_take()
+            writer.write(heard.hear(min(now_us, end_us), chunk), chunk)
+        progress(min(now_us / end_us, 1.0))
+    return truths
 
 
-def _save_truth(path: Path, side: HandSide, hand_length_m: float, clocks: np.ndarray) -> None:
-    layout, subject = glove(side), ideal_subject(side, hand_length_m)
-    _, truth = signals(subject, layout, showcase(side), clocks - clocks[0])
-    np.savez_compressed(
-        truth_path(path),
-        time_us=clocks,
-        sensors=np.array(layout.names),
-        q_world_sensor=truth.q_world_sensor,
-        q_world_segment=truth.q_world_segment,
-        t_world_joint=truth.t_world_joint,
-        t_world_tip=truth.t_world_tip,
-        angles=truth.angles,
+def _truth_file(
+    rehearsed: Rehearsed, setup: Setup, truths: list[Truth], seconds: float
+) -> TruthFile:
+    time_us = np.concatenate([truth.time_us for truth in truths])
+    count = int(np.searchsorted(time_us, round(seconds * 1e6), side="right"))
+
+    def whole(name: str) -> Array:
+        return np.concatenate([getattr(truth, name) for truth in truths])[:count]
+
+    subject, mounting = rehearsed.subject, rehearsed.worn.mounting
+    skeleton, mechanism = subject.skeleton, subject.mechanism
+    facts = {
+        "person": subject.number,
+        "side": subject.side,
+        "hand_length_m": subject.hand_length_m,
+        "motion": rehearsed.motion,
+        "imperfections": tell(rehearsed.imperfections),
+        "seed": rehearsed.seed,
+    }
+    return TruthFile(
+        time_us=time_us[:count],
+        sensors=setup.layout.names,
+        q_world_segment=whole("q_world_segment"),
+        q_world_sensor=whole("q_world_sensor"),
+        t_world_joint=whole("t_world_joint"),
+        t_world_sensor=whole("t_world_sensor"),
+        t_world_tip=whole("t_world_tip"),
+        angles=whole("angles"),
+        q_world_start=rehearsed.worn.world.q_world_start,
+        t_parent_joint=skeleton.t_parent_joint,
+        q_parent_rest=skeleton.q_parent_rest,
+        t_distal_tip=skeleton.t_distal_tip,
+        q_segment_sensor=mounting.q_segment_sensor,
+        t_segment_sensor=mounting.t_segment_sensor,
+        axes=mechanism.axes,
+        points=mechanism.points,
+        facts=msgspec.json.encode(facts).decode(),
     )

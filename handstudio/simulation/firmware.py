@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Bool, Float, Int16, Int64
 
 from handstudio.arrays import Array
 from handstudio.protocol.codec import Sent, encode
-from handstudio.protocol.commands import blink_asked, rate_asked
+from handstudio.protocol.commands import PERFORM, blink_asked, performance_asked, rate_asked
 from handstudio.protocol.decoder import CommandDecoder
 from handstudio.protocol.framing import DELIMITER
 from handstudio.protocol.packets import (
@@ -29,7 +29,6 @@ from handstudio.protocol.packets import (
     Status,
     Temperature,
 )
-from handstudio.simulation.imperfections import Readings
 
 _SECOND_US = 1_000_000
 RATES_HZ = tuple(rate for rate in range(50, 1001) if _SECOND_US % rate == 0)
@@ -38,11 +37,32 @@ RATES_HZ = tuple(rate for rate in range(50, 1001) if _SECOND_US % rate == 0)
 _HEALTH_EVERY_US = 1 * _SECOND_US
 _TEMPERATURE_EVERY_US = 10 * _SECOND_US
 _SUPPLY_MV = 5000
-_CELSIUS = 31.0  # of every sensor: warmed by the hand it sits on
+_CELSIUS = 31.0  # of every sensor before it was ever read: warmed by the hand it sits on
+_LONGEST_TEXT = 255  # of a reply [bytes of UTF-8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """Consecutive instants of all sensors, as the wire has them.
+
+    Attributes:
+        counts: Accelerometer, gyroscope, magnetometer; x y z each.
+        fresh: The magnetometer reading is new.
+        answering: The sensor gave a reading.
+        celsius: How warm the sensors were at the last of these instants.
+    """
+
+    counts: Int16[Array, "n s 9"]
+    fresh: Bool[Array, "n s"]
+    answering: Bool[Array, "n s"]
+    celsius: Float[Array, " s"]
 
 
 Sensors: TypeAlias = Callable[[Int64[Array, " n"], int], Readings]
 """Reads the next instants [µs since START], which are one period apart, at a rate [Hz]."""
+
+Performer: TypeAlias = Callable[[str], tuple[Result, str]]
+"""Has the wearer do what the text says; how that went, and a word about it."""
 
 
 class Firmware:
@@ -55,16 +75,32 @@ class Firmware:
         description: Of the device, with the rate to begin with (one of `RATES_HZ`).
         sensors: What to read.
         tx_buffer: Size of the transmit buffer [bytes].
+        performer: Whoever can be asked to perform; None: nobody, the command is unknown.
+        wire: What becomes of a frame on its way: as it is, damaged, or nothing.
+        read_ahead: Instants read in one go: 0.1 s of them unless told. One by one costs 50 times
+            as much; what is asked of the wearer happens after those already read.
 
     Attributes:
         blinking: Sensor number (0: the device) and duration [ms] last asked for, if any.
     """
 
-    def __init__(self, description: Description, sensors: Sensors, tx_buffer: int = 4096) -> None:
+    def __init__(
+        self,
+        description: Description,
+        sensors: Sensors,
+        tx_buffer: int = 4096,
+        *,
+        performer: Performer | None = None,
+        wire: Callable[[bytes], bytes] | None = None,
+        read_ahead: int | None = None,
+    ) -> None:
         self.blinking: tuple[int, int] | None = None
         self._description = description
         self._sensors = sensors
         self._tx_buffer = tx_buffer
+        self._performer = performer
+        self._wire, self._read_ahead = wire, read_ahead
+        self._celsius = np.full(len(description.sensors), _CELSIUS)
         self._now_us = self._temperature_due_us = 0
         self._health_due_us = _HEALTH_EVERY_US
         self._sequence = self._sent = self._dropped = 0
@@ -125,7 +161,8 @@ class Firmware:
 
     def _start(self, _: Request) -> tuple[Result, str]:
         if self._stream is None:
-            self._stream = _Stream(self._sensors, self._now_us, self._description.rate_hz)
+            rate_hz = self._description.rate_hz
+            self._stream = _Stream(self._sensors, self._now_us, rate_hz, self._read_ahead)
         return Result.OK, ""
 
     def _stop(self, _: Request) -> tuple[Result, str]:
@@ -148,29 +185,39 @@ class Firmware:
         self.blinking = asked
         return Result.OK, ""
 
+    def _perform(self, request: Request) -> tuple[Result, str]:
+        if self._performer is None:
+            return self._refuse(request)
+        asked = performance_asked(request)
+        if asked is None:
+            return Result.BAD_ARGUMENT, "not UTF-8"
+        result, text = self._performer(asked)
+        return result, text.encode()[:_LONGEST_TEXT].decode(errors="ignore")
+
     # --- what is due --------------------------------------------------------------------------
 
     def _say_due(self) -> None:
         sensors = len(self._description.sensors)
         if self._stream is not None and self._stream.due_us == self._now_us:
-            self._say_instant(self._stream.take())
+            self._say_instant(*self._stream.take())
         if self._health_due_us == self._now_us:
             self._health_due_us += _HEALTH_EVERY_US
             errors = (0,) * sensors
             self._put(Health(self._now_us, self._sent, self._dropped, _SUPPLY_MV, errors))
         if self._temperature_due_us == self._now_us:
             self._temperature_due_us += _TEMPERATURE_EVERY_US
-            self._put(Temperature(self._now_us, np.full(sensors, _CELSIUS)))
+            self._put(Temperature(self._now_us, self._celsius))
 
-    def _say_instant(self, instant: Readings) -> None:
+    def _say_instant(self, block: Readings, at: int) -> None:
+        self._celsius = block.celsius
         packet = ImuPacket(
             epoch=self._description.epoch & 0xFF,
             status=Status.DROPPED if self._dropping else Status(0),
             sequence=self._sequence,
             clock_us=self._now_us,
-            answering=np.ones(len(self._description.sensors), dtype=bool),
-            fresh=instant.fresh[0],
-            counts=instant.counts[0],
+            answering=block.answering[at],
+            fresh=block.fresh[at],
+            counts=block.counts[at],
         )
         self._sequence += 1
         self._dropping = not self._put(packet)
@@ -194,7 +241,7 @@ class Firmware:
     def _append(self, frame: bytes) -> bool:
         fits = len(self._buffer) + len(frame) <= self._tx_buffer
         if fits:
-            self._buffer += frame
+            self._buffer += frame if self._wire is None else self._wire(frame)
         return fits
 
 
@@ -204,16 +251,15 @@ _ACTIONS: dict[int, Callable[[Firmware, Request], tuple[Result, str]]] = {
     Command.STOP: Firmware._stop,
     Command.SET_RATE: Firmware._set_rate,
     Command.BLINK: Firmware._blink,
+    PERFORM: Firmware._perform,
 }
 
 
 class _Stream:
-    """The instants between START and STOP, a block ahead: one by one costs 50 times as much."""
+    """The instants between START and STOP, a block ahead."""
 
-    _BLOCK = 64
-
-    def __init__(self, sensors: Sensors, began_us: int, rate_hz: int) -> None:
-        self._sensors = sensors
+    def __init__(self, sensors: Sensors, began_us: int, rate_hz: int, block: int | None) -> None:
+        self._sensors, self._size = sensors, block
         self._began_us = began_us
         self._read_ahead(began_us, rate_hz)
 
@@ -226,17 +272,17 @@ class _Stream:
         """Go on at another rate, one of its periods from now."""
         self._read_ahead(now_us + _SECOND_US // rate_hz, rate_hz)
 
-    def take(self) -> Readings:
-        """The readings that are due, one instant; the next become due."""
-        here = slice(self._at, self._at + 1)
-        instant = Readings(self._block.counts[here], self._block.fresh[here])
+    def take(self) -> tuple[Readings, int]:
+        """The block and where in it the instant is that is due; the next becomes due."""
+        block, at = self._block, self._at
         self._at += 1
-        if self._at == self._BLOCK:
+        if self._at == len(self._block_us):
             self._read_ahead(int(self._block_us[-1]) + self._period_us, self._rate_hz)
-        return instant
+        return block, at
 
     def _read_ahead(self, first_us: int, rate_hz: int) -> None:
         self._rate_hz, self._period_us = rate_hz, _SECOND_US // rate_hz
-        self._block_us = first_us + self._period_us * np.arange(self._BLOCK)
+        size = self._size or max(1, rate_hz // 10)
+        self._block_us = first_us + self._period_us * np.arange(size)
         self._block = self._sensors(self._block_us - self._began_us, rate_hz)
         self._at = 0

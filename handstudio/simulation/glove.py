@@ -1,50 +1,85 @@
-"""A glove on a hand that performs: its twenty sensors' readings, as long as anyone asks."""
+"""A glove on a person who performs: its sensors' readings, as long as anyone asks."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Int64
 
 from handstudio.arrays import Array
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.hand.skeleton import HandSide
 from handstudio.layout import glove
 from handstudio.protocol.codec import VERSION
 from handstudio.protocol.packets import Description
 from handstudio.samples import STANDARD_GRAVITY
-from handstudio.simulation.imperfections import MPU9250, Readings, read, switched_on
+from handstudio.simulation.firmware import Readings
+from handstudio.simulation.imperfections.readout import MPU9250
+from handstudio.simulation.imperfections.strengths import PLAIN, Imperfections
 from handstudio.simulation.motions.showcase import showcase
-from handstudio.simulation.rig import signals
-from handstudio.simulation.subject import ideal_subject
-from handstudio.simulation.trajectory import Trajectory
+from handstudio.simulation.subject import Subject, ideal_subject
+from handstudio.simulation.trajectory import Trajectory, turned_to
+from handstudio.simulation.worn import Worn, begin, sense, wear
 
 SENSORS = tuple(range(1, 21))
 MAX_RATE_HZ = 1000
 
 
-class WornGlove:
-    """Readings of the glove's sensors during a motion; a seed is one glove.
+class Wire:
+    """The way of a device's frames to the host, lossy as the imperfections have it."""
 
-    Instants may be asked for in pieces of any size; the noise goes on from piece to piece.
+    def __init__(self, imperfections: Imperfections, seed: int) -> None:
+        self._imperfections, self._seed = imperfections, seed
+
+    def carry(self, frame: bytes) -> bytes:
+        """What arrives of a frame."""
+        return frame
+
+
+class WornGlove:
+    """What a glove's sensors read while its wearer performs.
+
+    Instants may be asked for in pieces of any size; whatever drifts goes on from piece to piece.
+    When time begins anew at 0, so does the motion.
     """
 
-    def __init__(
-        self,
-        side: HandSide = "right",
-        seed: int = 0,
-        hand_length_m: float = ADULT_HAND_LENGTH_M,
-        trajectory: Trajectory | None = None,
-    ) -> None:
-        self._layout = glove(side)
-        self._subject = ideal_subject(side, hand_length_m)
-        self._trajectory = showcase(side) if trajectory is None else trajectory
-        self._seed = seed
-        self._state = switched_on(len(self._layout.sensors))
+    def __init__(self, worn: Worn, motion: Trajectory) -> None:
+        self._worn, self._first = worn, motion
+        self._state = begin(worn)
+        self._motion = motion
+        self._asked: Trajectory | None = None
+        self._next_us, self._began_us = 0, 0  # on the time axis that never begins anew
+
+    def turn_to(self, motion: Trajectory) -> None:
+        """Perform something else from the next instants on. May be called from another thread."""
+        self._asked = motion
 
     def read(self, time_us: Int64[Array, " n"], rate_hz: int) -> Readings:
         """Read the next instants, given in time since the motion began [µs]."""
-        exact, _ = signals(self._subject, self._layout, self._trajectory, time_us)
-        readings, self._state = read(MPU9250, self._seed, rate_hz, self._state, exact)
-        return readings
+        if self._began_us + time_us[0] < self._next_us:
+            self._began_us = self._next_us - int(time_us[0])
+            self._motion = replace(self._first, begins_s=self._began_us * 1e-6)
+        ours_us = time_us + self._began_us
+        asked, self._asked = self._asked, None
+        if asked is not None:
+            self._motion = turned_to(self._motion, float(ours_us[0]) * 1e-6, asked)
+        sensed, self._state = sense(self._worn, self._state, self._motion, ours_us, rate_hz)
+        self._next_us = int(ours_us[-1]) + 1
+        return Readings(sensed.counts, sensed.fresh, sensed.answering, sensed.celsius[-1])
+
+
+def plain_glove(
+    side: HandSide = "right",
+    seed: int = 0,
+    motion: Trajectory | None = None,
+    *,
+    subject: Subject | None = None,
+    imperfections: Imperfections = PLAIN,
+) -> WornGlove:
+    """A glove on the ideal hand with nothing but noise and bias, in the showcase unless told."""
+    someone = ideal_subject(side) if subject is None else subject
+    worn = wear(someone, glove(side), imperfections, seed)
+    return WornGlove(worn, showcase(side) if motion is None else motion)
 
 
 def description(side: HandSide, seed: int, rate_hz: int, epoch: int, name: str) -> Description:
@@ -55,7 +90,7 @@ def description(side: HandSide, seed: int, rate_hz: int, epoch: int, name: str) 
         epoch=epoch,
         name=name,
         serial_number=f"VG-{seed}",
-        firmware="virtual 1",
+        firmware="virtual 2",
         side=side,
         sensors=SENSORS,
         rate_hz=rate_hz,

@@ -142,7 +142,7 @@ def test_the_library_is_kept_tidy(
 ) -> None:
     sessions = tmp_path / "sessions"
     for name in ("reach", "grasp"):
-        simulate(sessions, seconds=3.0, subject="S07", name=name)
+        simulate(sessions, seconds=3.0, code="S07", name=name)
     page = visit(start_studio())
     page.get_by_role("tab", name="Review").click()
     expect(page.get_by_text("Takes: 2")).to_be_visible()
@@ -234,7 +234,7 @@ def test_diagnostics_come_with_one_click(start_studio: Start, visit: Callable[..
 def test_a_take_of_long_ago_is_computed_with_progress_and_opens(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:
-    path = simulate(tmp_path / "sessions", seconds=240.0, subject="S07", name="long")
+    path = simulate(tmp_path / "sessions", seconds=240.0, code="S07", name="long")
     assert open_take(path).summary is not None
     page = visit(start_studio())
     page.get_by_role("tab", name="Review").click()

@@ -94,7 +94,7 @@ def test_ctrl_c_while_recording_keeps_the_take(
 def test_an_interrupted_recording_can_be_had_back(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:
-    take = simulate(tmp_path / "sessions", seconds=6.0, subject="S07", name="broken")
+    take = simulate(tmp_path / "sessions", seconds=6.0, code="S07", name="broken")
     cut = take.with_name(take.name + ".recording")
     cut.write_bytes(take.read_bytes()[: take.stat().st_size // 2])
     take.unlink()

@@ -31,7 +31,7 @@ from handstudio.process import kept_motion, process
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import recomputed_health
 from handstudio.simulation.firmware import Firmware
-from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.glove import description, plain_glove
 
 Damage: TypeAlias = Callable[[bytes], bytes]
 
@@ -195,7 +195,7 @@ def glove(tmp_path: Path) -> Iterator[Callable[..., Glove]]:
     def make(
         kind: str = "pty", seed: int = 0, rate: int = 100, epoch: int = 1, port: int = 0
     ) -> Glove:
-        worn = WornGlove("right", seed)
+        worn = plain_glove("right", seed)
         told = description("right", seed, rate, epoch, "Virtual glove")
         line = TcpLine(port) if kind == "tcp" else _pty(tmp_path / "glove")
         gloves.append(Glove(line, Firmware(told, worn.read, ROOM)))

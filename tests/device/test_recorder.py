@@ -15,7 +15,7 @@ from handstudio.errors import TakeError
 from handstudio.process import kept_motion, process
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.recovery import recover
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import for_device
@@ -28,7 +28,7 @@ SUMMARY = Summary(0, 0, 0.0)
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Take:
-    return open_take(simulate(tmp_path_factory.mktemp("sessions"), seconds=2.0, seed=6))
+    return open_take(simulate(tmp_path_factory.mktemp("sessions"), rehearse(seed=6), seconds=2.0))
 
 
 def header(path: Path) -> Header:

@@ -30,7 +30,7 @@ from handstudio.protocol.packets import (
     Request,
 )
 from handstudio.recording.header import Header
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import Setup, for_device
@@ -63,7 +63,7 @@ class Open:
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory) -> Path:
-    return simulate(tmp_path_factory.mktemp("sessions"), seconds=2.0, seed=5)
+    return simulate(tmp_path_factory.mktemp("sessions"), rehearse(seed=5), seconds=2.0)
 
 
 @pytest.fixture(params=["serial", "tcp", "virtual:", "virtual:?transport=tcp", "replay"])
@@ -297,7 +297,7 @@ def test_a_port_nobody_listens_on():
         "",
         "virtual:rate=1000",
         "virtual://[",
-        "virtual:?speed=3",
+        "virtual:?pace=3",
         "virtual:?rate=77",
         "virtual:?side=both",
     ],

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from handstudio.protocol.codec import encode
+from handstudio.protocol.commands import PERFORM, perform
 from handstudio.protocol.decoder import V1Decoder
 from handstudio.protocol.packets import (
     Command,
@@ -29,7 +30,7 @@ from handstudio.protocol.packets import (
     Result,
     Status,
 )
-from handstudio.simulation.glove import WornGlove
+from handstudio.simulation.glove import plain_glove
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 lines = pytest.mark.parametrize("line", [pytest.param("--pty", marks=posix), "--tcp"])
@@ -160,10 +161,63 @@ def test_it_streams_in_real_time_what_its_sensors_read(started, connected, line,
     assert np.unique(np.diff(clocks)).tolist() == [1_000_000 // rate_hz]
     # never ahead of time; how far behind is the busy machine's business
     assert 0.3 < (clocks[-1] - clocks[0]) * 1e-6 < took + 0.3
-    expected = WornGlove("left", 11).read(clocks - clocks[0], rate_hz)
+    expected = plain_glove("left", 11).read(clocks - clocks[0], rate_hz)
     for k, packet in enumerate(instants):
         np.testing.assert_array_equal(packet.counts, expected.counts[k])
         np.testing.assert_array_equal(packet.fresh, expected.fresh[k])
+
+
+def test_its_wearer_does_what_the_host_asks(started, connected):
+    host = connected(started("--pty", "--motion", "showcase~slow", "--seed", "3"))
+    host.ask(Command.START)
+    quiet = moved(host.listen(0.5))
+    os.write(host._file, encode(perform(7, "showcase~fast")))
+    heard = host.until(lambda packets: bool(only(Reply, packets)))
+    (reply,) = only(Reply, heard)
+    assert (reply.command, reply.tag, reply.result) == (PERFORM, 7, Result.OK)
+    # asked for later, when the fist of the fast one has long begun and the slow one still rests
+    heard = host.listen(4.0)
+    assert quiet < 0.1 < 1.0 < moved(heard)
+    assert only(Missing, heard) == []
+
+
+@pytest.mark.parametrize("asked", ["juggling", "showcase+", "showcase:twice", "\ud800"])
+def test_what_nobody_can_do_is_refused_with_a_word(started, connected, asked):
+    host = connected(started("--pty"))
+    request = Request(PERFORM, 3, asked.encode(errors="surrogatepass"))
+    os.write(host._file, encode(request))
+    (reply,) = only(Reply, host.until(lambda packets: bool(only(Reply, packets))))
+    assert (reply.tag, reply.result) == (3, Result.BAD_ARGUMENT)
+    assert reply.text
+
+
+def test_its_clock_may_run_faster(started, connected):
+    host = connected(started("--pty", "--speed", "4", "--rate", "50"))
+    host.ask(Command.START)
+    began = time.monotonic()
+    heard = host.listen(1.0)
+    took = time.monotonic() - began
+    clocks = [packet.clock_us * 1e-6 for packet in only(ImuPacket, heard)]
+    assert 2.0 < clocks[-1] - clocks[0] < 4.0 * took + 0.5
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "word"),
+    [("--motion", "juggling", "juggling"), ("--imperfections", "rust", "rust")],
+)
+def test_who_cannot_begin_says_why(option, value, word):
+    command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--pty", option, value]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert said.returncode == 1
+    what, remedy = json.loads(said.stdout)["problem"]
+    assert word in what
+    assert remedy
+
+
+def moved(packets: list[Packet]) -> float:
+    """Fastest turn of the middle fingertip [rad/s], its bias taken off."""
+    counts = np.array([packet.counts[13, 3:6] for packet in only(ImuPacket, packets)], dtype=float)
+    return float(np.abs(counts - counts[0]).max() * np.deg2rad(2000.0) / 32768)
 
 
 @lines

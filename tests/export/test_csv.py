@@ -25,7 +25,7 @@ from handstudio.layout import JointPlace, Layout, SensorPlace
 from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.header import Header, Summary
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import HandModel, Setup
@@ -38,7 +38,11 @@ def recorded(tmp_path_factory) -> Take:
     """Six seconds of a left virtual glove: rest, then the forearm raised and a fist begun."""
     folder = tmp_path_factory.mktemp("recorded")
     hand = HandModel(hand_length_m=0.175)
-    return open_take(simulate(folder, seconds=6.0, seed=1, side="left", hand=hand))
+    return open_take(
+        simulate(
+            folder, rehearse(seed=1, side="left", hand_length_m=hand.hand_length_m), seconds=6.0
+        )
+    )
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ from handstudio.protocol.packets import (
 from handstudio.recording.take import open_take
 from handstudio.samples import ImuSamples
 from handstudio.settings import SettingsStore
-from handstudio.simulation.glove import SENSORS, WornGlove, description
+from handstudio.simulation.glove import SENSORS, description, plain_glove
 
 RATE_HZ = 100
 PERIOD_US = 1_000_000 // RATE_HZ
@@ -62,7 +62,7 @@ class HourOfBytes:
         self.may_start = threading.Event()
         self._commands, self._out = CommandDecoder(), bytearray(b"\0")
         self._streams = False
-        worn, times_us = WornGlove("right", 5), PERIOD_US * np.arange(ROUND_S * RATE_HZ)
+        worn, times_us = plain_glove("right", 5), PERIOD_US * np.arange(ROUND_S * RATE_HZ)
         self._readings = [
             worn.read(times_us[k : k + RATE_HZ], RATE_HZ) for k in range(0, len(times_us), RATE_HZ)
         ]

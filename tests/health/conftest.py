@@ -15,7 +15,7 @@ from handstudio.health.watch import Watch
 from handstudio.protocol.packets import ImuPacket, Missing, Packet, Status
 from handstudio.samples import Event, Ranges, from_packets
 from handstudio.setup import Setup, for_device
-from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.glove import description, plain_glove
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.postures import Script, scripted
 
@@ -89,7 +89,7 @@ def _performed(
     told = description("right", seed, rate_hz, epoch=1, name="glove")
     played = showcase("right") if motion == "showcase" else scripted(SCRIPTS[motion], "right")
     time_us = np.arange(round(seconds * rate_hz)) * (1_000_000 // rate_hz)
-    readings = WornGlove("right", seed, trajectory=played).read(time_us, rate_hz)
+    readings = plain_glove("right", seed, played).read(time_us, rate_hz)
     setup = for_device(told, "handstudio-1")
     return setup, Ranges.of(told), DEVICE_US + time_us, readings.counts, readings.fresh
 

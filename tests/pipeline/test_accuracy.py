@@ -18,7 +18,7 @@ from handstudio.maths import so3
 from handstudio.protocol.packets import ImuPacket, Status
 from handstudio.samples import from_packets
 from handstudio.setup import Setup, for_device
-from handstudio.simulation.glove import WornGlove, description
+from handstudio.simulation.glove import description, plain_glove
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
 from handstudio.simulation.subject import ideal_subject
@@ -28,7 +28,7 @@ def worn(side: str, seed: int, rate_hz: int, seconds: float) -> tuple[Setup, lis
     """What a glove sends during the showcase, and the instants of it [µs]."""
     setup = for_device(description(side, seed, rate_hz, epoch=1, name="simulated"), "handstudio-1")
     time_us = np.arange(0, round(seconds * 1e6), 1_000_000 // rate_hz)
-    readings = WornGlove(side, seed).read(time_us, rate_hz)
+    readings = plain_glove(side, seed).read(time_us, rate_hz)
     everyone = np.ones(len(setup.layout.sensors), dtype=bool)
     packets = [
         ImuPacket(1, Status(0), k, int(clock_us), everyone, readings.fresh[k], readings.counts[k])

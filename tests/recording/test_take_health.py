@@ -9,7 +9,7 @@ from handstudio.health.record import TakeHealth
 from handstudio.recording.header import Summary
 from handstudio.recording.raw_import import import_folder
 from handstudio.recording.recovery import recover
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
 from handstudio.recording.take_health import health_of_take, recomputed_health
 from handstudio.recording.writer import TakeWriter
@@ -17,7 +17,7 @@ from handstudio.recording.writer import TakeWriter
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
-    return open_take(simulate(tmp_path_factory.mktemp("sessions"), seconds=3.0, seed=4))
+    return open_take(simulate(tmp_path_factory.mktemp("sessions"), rehearse(seed=4), seconds=3.0))
 
 
 def test_a_simulated_take_keeps_its_health(take):

@@ -247,7 +247,9 @@ def test_a_take_is_simulated_with_its_truth(handstudio, tmp_path):
         ("--rate", 0, "0 Hz"),
         ("--seconds", 0, "0 s"),
         ("--seconds", -1, "-1 s"),
-        ("--hand-length-mm", 0.187, "0.187 mm"),
+        ("--motion", "juggling", "juggling"),
+        ("--motion", "showcase+", "understood"),
+        ("--imperfections", "rust", "rust"),
     ],
 )
 def test_what_cannot_be_simulated_is_said(here, tmp_path, option, value, words):

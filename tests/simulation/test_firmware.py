@@ -23,9 +23,8 @@ from handstudio.protocol.packets import (
     Status,
     Temperature,
 )
-from handstudio.simulation.firmware import RATES_HZ, Firmware
+from handstudio.simulation.firmware import RATES_HZ, Firmware, Readings
 from handstudio.simulation.glove import description
-from handstudio.simulation.imperfections import Readings
 
 SECOND = 1_000_000
 WRAP = 1 << 32
@@ -35,7 +34,8 @@ def clockwork(time_us: np.ndarray, _: int) -> Readings:
     """Sensors whose first count tells the milliseconds since START."""
     counts = np.zeros((len(time_us), 20, 9), dtype=np.int16)
     counts[:, 0, 0] = time_us // 1000 % 30_000
-    return Readings(counts, np.ones((len(time_us), 20), dtype=bool))
+    flags = np.ones((len(time_us), 20), dtype=bool)
+    return Readings(counts, flags, flags, np.full(20, 33.0))
 
 
 @dataclass

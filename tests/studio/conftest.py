@@ -23,7 +23,7 @@ from handstudio.export.csv import Content, Window, export_csv
 from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.header import Header
-from handstudio.recording.simulated import simulate
+from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.subjects import Subject, create_subject
 from handstudio.recording.take import Take, open_take
 from handstudio.settings import SettingsStore
@@ -33,7 +33,7 @@ TICK_S = 0.016
 
 @pytest.fixture(scope="session")
 def take(tmp_path_factory: pytest.TempPathFactory) -> Take:
-    path: Path = simulate(tmp_path_factory.mktemp("sessions"), seconds=8.0, seed=2)
+    path: Path = simulate(tmp_path_factory.mktemp("sessions"), rehearse(seed=2), seconds=8.0)
     return open_take(path)
 
 

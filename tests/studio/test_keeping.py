@@ -21,7 +21,7 @@ from .conftest import after
 @pytest.fixture
 def taken(studio: Studio) -> Path:
     """One take, processed, open."""
-    path = simulate(studio.state.sessions, seconds=3.0, subject="S07", name="reach")
+    path = simulate(studio.state.sessions, seconds=3.0, code="S07", name="reach")
     process(open_take(path))
     studio.refresh_takes()
     assert after(studio, intents.OpenTake(path)).review is not None
@@ -99,7 +99,7 @@ def test_a_mark_goes_where_it_is_not_wanted(studio: Studio, taken: Path) -> None
 
 
 def test_the_list_shows_what_was_searched_for(studio: Studio, taken: Path) -> None:
-    simulate(studio.state.sessions, seconds=3.0, subject="S08", name="pour")
+    simulate(studio.state.sessions, seconds=3.0, code="S08", name="pour")
     studio.refresh_takes()
     state = after(studio, intents.Search("s08"))
     assert [entry.name for entry in state.shelf.found] == ["pour"]

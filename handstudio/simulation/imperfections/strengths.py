@@ -91,6 +91,13 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 IDEAL = Imperfections()
 """Perfect sensors where the maker meant them, in an undisturbed room."""
 
+PLAIN = Imperfections(
+    **dict.fromkeys(
+        ("white_noise", "bias", "saturation", "quantisation", "mag_noise", "mag_hold"), 1.0
+    )
+)
+"""Nothing but what every chip has: noise, bias and counts. An easy case, for demonstrations."""
+
 TYPICAL = Imperfections(
     **dict.fromkeys(NAMES, 1.0)
     | {
@@ -118,7 +125,12 @@ HARSH = Imperfections(
 )
 """A bad day: everything two to three times as bad, a dying sensor, a magnet on the desk."""
 
-PRESETS: Mapping[str, Imperfections] = {"ideal": IDEAL, "typical": TYPICAL, "harsh": HARSH}
+PRESETS: Mapping[str, Imperfections] = {
+    "plain": PLAIN,
+    "ideal": IDEAL,
+    "typical": TYPICAL,
+    "harsh": HARSH,
+}
 
 
 def told(imperfections: Imperfections) -> dict[str, float]:

@@ -1,0 +1,98 @@
+"""Commands about virtual subjects: what they can do, and takes of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from handstudio.commands.arguments import Json
+from handstudio.hand.skeleton import HandSide
+from handstudio.recording import library
+from handstudio.recording.material import material
+from handstudio.recording.simulated import rehearse
+from handstudio.recording.simulated import simulate as simulate_take
+from handstudio.shell import out, print_json, print_table, progress
+from handstudio.simulation.imperfections.strengths import NAMES, PRESETS, parse
+from handstudio.simulation.motions.catalogue import motions as all_motions
+from handstudio.simulation.motions.manners import MANNERS
+
+
+def motions(*, json: Json = False) -> int:
+    """List what a virtual subject can do, how, and which imperfections there are.
+
+    Args:
+        json: Print JSON for a program instead of words.
+    """
+    known = all_motions()
+    recordings = sorted(material().recordings)
+    if json:
+        print_json(
+            {
+                "motions": {name: one.what for name, one in known.items()},
+                "manners": {name: one.what for name, one in MANNERS.items()},
+                "recordings": recordings,
+                "imperfections": list(NAMES),
+                "presets": list(PRESETS),
+            }
+        )
+        return 0
+    rows = [
+        [f"{name}:{one.argument.upper()}" if one.argument else name, one.what]
+        for name, one in known.items()
+    ]
+    print_table("Motions", ["name", "what is done"], rows)
+    if recordings:
+        out.print(f"Recordings of real hands: {', '.join(recordings)}\n")
+    print_table("Manners", ["~", "how"], [[name, one.what] for name, one in MANNERS.items()])
+    print_table("Imperfections", ["name"], [[name] for name in NAMES])
+    out.print(f"Sets of them: {', '.join(PRESETS)}")
+    out.print(
+        "\nOne after the other: calibration+open_close. At the same time: typing&elbow_moving. "
+        "Again: 3*open_close.\nIn a manner: calibration~sloppy. "
+        "Try: handstudio simulate --subject 7 --motion calibration+scissors "
+        "--imperfections typical,magnet"
+    )
+    return 0
+
+
+def simulate(
+    *,
+    subject: int = 0,
+    motion: str = "showcase",
+    imperfections: str = "plain",
+    seed: int = 0,
+    side: HandSide = "right",
+    seconds: float | None = None,
+    rate: int = 100,
+    name: str = "",
+    out_folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None,
+) -> int:
+    """Write a take of a virtual subject, its labels, and the truth beside it.
+
+    Args:
+        subject: Number of the person; 0 is the ideal one.
+        motion: What is done (handstudio motions lists what there is), such as
+            calibration+scissors.
+        imperfections: Of sensors, skin and room: ideal, plain, typical or harsh, and changes to it,
+            such as typical,-wobble,scale=2.
+        seed: Of the performance, the donning and the noise.
+        side: Which hand.
+        seconds: How long; as long as the motion unless given.
+        rate: Samples a second.
+        name: Of the take; as the motion unless given.
+        out_folder: Folder of the takes (default: as the studio's).
+    """
+    strengths = parse(imperfections)
+    with progress("simulating", quiet=False) as share:
+        path = simulate_take(
+            library.sessions_folder(out_folder),
+            rehearse(subject, motion, strengths, seed, side=side),
+            seconds=seconds,
+            rate_hz=rate,
+            name=name,
+            progress=share,
+        )
+    out.print(str(path))
+    return 0

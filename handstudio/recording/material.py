@@ -1,0 +1,13 @@
+"""What virtual subjects need from files: how characters are written, recordings of real hands."""
+
+from __future__ import annotations
+
+from handstudio.simulation.motions.actor import Material
+
+RECORDINGS = "HANDSTUDIO_DATA"
+"""Environment variable: a folder of recordings, those of hands in its folder ``leap``."""
+
+
+def material() -> Material:
+    """Everything there is on this machine."""
+    return Material()
