@@ -177,7 +177,8 @@ def test_its_wearer_does_what_the_host_asks(started, connected):
     assert (reply.command, reply.tag, reply.result) == (PERFORM, 7, Result.OK)
     # asked for later, when the fist of the fast one has long begun and the slow one still rests
     heard = host.listen(4.0)
-    assert quiet < 0.1 < 1.0 < moved(heard)
+    assert quiet < 0.1
+    assert moved(heard) > 1.0
     assert only(Missing, heard) == []
 
 
