@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -25,8 +26,21 @@ from handstudio.pipeline import Motion
 from handstudio.setup import Setup
 
 
-def skeleton_of(setup: Setup) -> Skeleton:
-    """The skeleton a setup describes.
+@dataclass(frozen=True, slots=True, eq=False)
+class HandFit:
+    """What is known of this hand and of how the glove sits on it.
+
+    Attributes:
+        skeleton: Joint centres, segment frames, fingertips.
+        q_sensor_segment: Attitude of each sensor's segment in the sensor.
+    """
+
+    skeleton: Skeleton
+    q_sensor_segment: Float[Array, "s 4"]
+
+
+def fit_of(setup: Setup) -> HandFit:
+    """The hand a setup describes: mean proportions of its length, sensors as the maker meant them.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -38,18 +52,23 @@ def skeleton_of(setup: Setup) -> Skeleton:
             why=setup.layout.no_hand,
         )
     side: HandSide = "left" if setup.layout.side == "left" else "right"
-    return nominal_skeleton(side, setup.hand.hand_length_m)
+    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
+    return HandFit(skeleton, nominal_mounting(setup.layout))
 
 
-def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Float[Array, "n k 4"]:
+def segment_attitudes(
+    setup: Setup, q_world_sensor: Float[Array, "n s 4"], fit: HandFit | None = None
+) -> Float[Array, "n k 4"]:
     """Attitude of every segment: by its own sensor, else carried along by its parent at rest.
+
+    ``fit`` is the setup's own unless given, here and below.
 
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    skeleton = skeleton_of(setup)
+    fit = fit_of(setup) if fit is None else fit
+    skeleton, q_sensor_segment = fit.skeleton, fit.q_sensor_segment
     drivers = setup.layout.drivers
-    q_sensor_segment = nominal_mounting(setup.layout)
     out = np.empty((len(q_world_sensor), len(SEGMENTS), 4))
     driven = [index for index, name in enumerate(SEGMENTS) if name in drivers]
     sensors = [drivers[SEGMENTS[index]] for index in driven]
@@ -59,13 +78,16 @@ def segment_attitudes(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Fl
     return out
 
 
-def pose_of(setup: Setup, q_world_sensor: Float[Array, "n s 4"]) -> Pose:
+def pose_of(
+    setup: Setup, q_world_sensor: Float[Array, "n s 4"], fit: HandFit | None = None
+) -> Pose:
     """The placed hand.
 
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    return posed(skeleton_of(setup), segment_attitudes(setup, q_world_sensor))
+    fit = fit_of(setup) if fit is None else fit
+    return posed(fit.skeleton, segment_attitudes(setup, q_world_sensor, fit))
 
 
 def measured_angles(layout: Layout) -> tuple[Angle, ...]:
@@ -81,18 +103,22 @@ def measured_angles(layout: Layout) -> tuple[Angle, ...]:
 
 
 def angles_of(
-    setup: Setup, motion: Motion, angles: Sequence[Angle] | None = None
+    setup: Setup,
+    motion: Motion,
+    angles: Sequence[Angle] | None = None,
+    fit: HandFit | None = None,
 ) -> Float[Array, "n a"]:
     """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start.
 
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    attitudes = segment_attitudes(setup, motion.q_world_sensor)
-    q_sensor_forearm = nominal_mounting(setup.layout)[setup.layout.drivers["forearm"]]
+    fit = fit_of(setup) if fit is None else fit
+    attitudes = segment_attitudes(setup, motion.q_world_sensor, fit)
+    q_sensor_forearm = fit.q_sensor_segment[setup.layout.drivers["forearm"]]
     start = so3.multiply(motion.q_world_start, q_sensor_forearm)
     wanted = measured_angles(setup.layout) if angles is None else angles
-    return joint_angles(skeleton_of(setup), attitudes, start, wanted)
+    return joint_angles(fit.skeleton, attitudes, start, wanted)
 
 
 def has_start(motion: Motion) -> bool:

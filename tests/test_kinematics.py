@@ -16,12 +16,12 @@ from handstudio.kinematics import (
     angles_of,
     doubtful_segments,
     exported_angles,
+    fit_of,
     has_start,
     measured_angles,
     pose_of,
     relative_rotations,
     segment_attitudes,
-    skeleton_of,
 )
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.maths import so3
@@ -96,7 +96,7 @@ def test_segments_without_a_sensor_are_carried_along_straight():
     few = glove("right", ["SN1", "SN11"])
     truth, setup = true(few), setup_of(few)
     attitudes = segment_attitudes(setup, truth.q_world_sensor)
-    rest = skeleton_of(setup).q_parent_rest
+    rest = fit_of(setup).skeleton.q_parent_rest
     for index, name in enumerate(SEGMENTS):
         if name not in few.drivers:
             carried = so3.multiply(attitudes[:, PARENTS[index]], rest[index])

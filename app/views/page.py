@@ -19,7 +19,7 @@ from handstudio.device.health import HealthView
 from handstudio.device.orders import Newest, Phase
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import Skeleton
-from handstudio.kinematics import doubtful_segments, pose_of, skeleton_of
+from handstudio.kinematics import doubtful_segments, fit_of, pose_of
 from handstudio.layout import Layout
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import Setup
@@ -111,7 +111,7 @@ def scene_of(state: State) -> HandView | SensorsView | None:
     lit = frozenset[str]()
     if state.review is None and state.shaking is not None and state.shaking.sensor is not None:
         lit = frozenset({setup.layout.names[state.shaking.sensor]})
-    return HandView(setup.layout, skeleton_of(setup), single, doubtful, dead, lit)
+    return HandView(setup.layout, fit_of(setup).skeleton, single, doubtful, dead, lit)
 
 
 def overlay_of(state: State) -> str:
