@@ -80,13 +80,12 @@ class RawFilter(msgspec.Struct, frozen=True, tag="raw"):
         """Sum consecutive samples."""
         steps = steps_of(samples, stretch, heeded, state.period_s, state.gyr_bias)
         begins, heads = first(state.begun, steps.heeded), first(state.headed, steps.compass)
-        turn = np.where(begins[:, None], 0.0, steps.turn)
         found = np.stack([begins, begins, begins | heads], axis=1)
         finding = np.asarray(found.any(axis=(1, 2)))
         angles = state.angles.T
-        out = np.empty(turn.shape)
+        out = np.empty(steps.turn.shape)
         for k, any_found in enumerate(finding):
-            angles = angles + euler.rates(angles, turn[k])
+            angles = angles + euler.rates(angles, steps.turn[k])
             if any_found:
                 angles = np.where(found[k], steps.observed[k], angles)
             out[k] = angles

@@ -41,7 +41,6 @@ def steps_of(
         np.moveaxis(_where(heeded, samples.acc), 1, 0),
         np.moveaxis(_where(compass, samples.mag), 1, 0),
     )
-    observed[2] *= compass
     return Steps(
         turn=gyr * duration[:, None, None],
         duration_s=duration,

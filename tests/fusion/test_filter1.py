@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handstudio.fusion import euler
 from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
 from handstudio.hand.skeleton import nominal_skeleton
@@ -136,6 +137,54 @@ def test_the_first_reading_of_a_compass_that_comes_late_sets_the_heading():
     error = np.rad2deg(so3.angle_between(out, truth))
     np.testing.assert_allclose(error[:200], np.rad2deg(2.5))
     assert error[200:].max() < 1e-3
+
+
+# --- the filter -------------------------------------------------------------------------------
+
+
+def textbook(fusion: Filter1, samples: ImuSamples, sensor: int, angles: np.ndarray) -> np.ndarray:
+    """An extended Kalman filter in matrices (4.6 to 4.8, 4.23, 4.24), Jacobian by differences."""
+
+    def stepped(x: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        return x + euler.rates(x[:, None], turn[:, None])[:, 0]
+
+    dt = 0.01
+    q = (fusion.gyr_noise * fusion.gyr_factor) ** 2 * dt * np.eye(3)
+    noises = [fusion.inclination_noise, fusion.inclination_noise, fusion.heading_noise]
+    r = np.diag(np.square(noises)) / dt
+    p, x, out = np.deg2rad(1.0) ** 2 * np.eye(3), angles.copy(), []
+    for k in range(len(samples)):
+        turn = samples.gyr[k, sensor] * dt
+        f = np.stack(
+            [(stepped(x + h, turn) - stepped(x - h, turn)) / 2e-6 for h in 1e-6 * np.eye(3)], axis=1
+        )
+        x, p = stepped(x, turn), f @ p @ f.T + q
+        z = euler.observed(samples.acc[k, sensor, :, None], samples.mag[k, sensor, :, None])[:, 0]
+        seen = np.eye(3)[: 3 if samples.fresh[k, sensor] else 2]
+        gain = p @ seen.T @ np.linalg.inv(seen @ p @ seen.T + seen @ r @ seen.T)
+        x = x + gain @ seen @ np.angle(np.exp(1j * (z - x)))
+        p = p - gain @ seen @ p
+        out.append(x)
+    return np.array(out)
+
+
+def test_it_is_an_extended_kalman_filter():
+    """Of sensors that turn about all axes, so near the singularity that angles are coupled."""
+    rng = np.random.default_rng(9)
+    truth = euler.to_quaternion(np.array([[0.3, -2.0], [1.2, -1.1], [1.0, 3.0]]))
+    samples = resting(truth, 150)
+    samples = replace(
+        samples,
+        gyr=rng.normal(size=samples.gyr.shape) * 3.0,
+        acc=samples.acc + rng.normal(size=samples.acc.shape),
+        fresh=rng.random(samples.fresh.shape) < 0.5,
+    )
+    loud = Filter1(gyr_factor=2000.0)  # so that a step shows
+    out, _ = fuse(loud, samples, truth)
+    start = euler.from_quaternion(truth)
+    for sensor in range(2):
+        expected = textbook(loud, samples, sensor, start[:, sensor])
+        assert so3.angle_between(out[:, sensor], euler.to_quaternion(expected.T)).max() < 1e-7
 
 
 # --- motion -----------------------------------------------------------------------------------

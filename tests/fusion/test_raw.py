@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handstudio.calibration.attitude import attitude
 from handstudio.fusion.raw import RawFilter
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY, ImuSamples
@@ -105,6 +106,24 @@ def test_its_heading_begins_at_the_first_fresh_reading_of_the_compass():
     assert np.rad2deg(error[:8].min()) > 20.0
     assert np.rad2deg(error[8]) < 1.0
     assert after.headed.all()
+
+
+def test_without_a_compass_it_begins_with_its_x_axis_to_the_north():
+    q = so3.exp(np.random.default_rng(5).uniform(-2.0, 2.0, size=(1, 50, 3)))
+    q[0, :2] = so3.IDENTITY, so3.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.pi)
+    samples = turning(np.zeros((1, 50, 3)), q, 100.0)
+    samples = replace(samples, fresh=~samples.fresh)
+    out, _ = RAW.run(RAW.begin(50, 100.0), samples, np.ones(1), samples.valid)
+    assert so3.angle_between(out, attitude(samples.acc)).max() < 1e-12
+
+
+def test_after_a_restart_its_heading_is_found_anew():
+    samples, truth = swinging(100.0)
+    state = RAW.restart(RAW.place(RAW.begin(1, 100.0), 0, so3.about_z(2.0), np.zeros(3)))
+    fresh = samples.fresh.copy()
+    fresh[:4] = False
+    out, _ = RAW.run(state, replace(samples, fresh=fresh), np.ones(len(samples)), samples.valid)
+    assert np.rad2deg(so3.angle_between(out[4:], truth[4:]).max()) < 1.5
 
 
 @pytest.mark.parametrize("degrees_per_s", [50.0, 300.0, 3000.0])
