@@ -10,12 +10,12 @@ import pytest
 from handstudio.fusion import euler
 from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
-from handstudio.hand.skeleton import nominal_skeleton
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY, ImuSamples
+from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import signals
-from handstudio.simulation.showcase import showcase
+from handstudio.simulation.subject import ideal_subject
 
 FIELD = np.array([31.0, 0.0, -35.0])
 AXES = np.eye(3)
@@ -209,7 +209,7 @@ def test_dynamic_acceleration_misleads_it_as_the_thesis_found():
 def test_of_a_hand_in_motion_fingertips_are_misled_more_than_the_forearm():
     layout = glove("right", ["SN1", "SN14", "SN17"])
     time_us = np.arange(3000) * 10_000
-    exact, truth = signals(nominal_skeleton("right"), layout, showcase("right"), time_us)
+    exact, truth = signals(ideal_subject("right"), layout, showcase("right"), time_us)
     out, _ = fuse(Filter1(), exact, truth.q_world_sensor[0])
     error = so3.angle_between(out, truth.q_world_sensor)
     forearm, middle, index = np.rad2deg(np.sqrt((error**2).mean(axis=0)))
