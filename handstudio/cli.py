@@ -173,7 +173,7 @@ def process(
 
     Args:
         takes: The takes.
-        filter: Another filter than the take was recorded with (vqf).
+        filter: Another filter than the take was recorded with (vqf, raw, filter1).
         from_start: Ignore what the studio knew before the first byte of the take.
         csv: Also write the joint angles (orientations, where there is no hand) beside each take.
         json: Print JSON for a program instead of words.

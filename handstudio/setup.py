@@ -8,16 +8,22 @@ from typing import TypeAlias
 import msgspec
 
 from handstudio.errors import SetupError
+from handstudio.fusion.filter1 import Filter1
+from handstudio.fusion.raw import RawFilter
 from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.layout import Layout, glove
 from handstudio.protocol.packets import Description, sensor_name
 from handstudio.samples import Ranges
 
-AnyFilter: TypeAlias = VqfFilter
+AnyFilter: TypeAlias = VqfFilter | RawFilter | Filter1
 """The filters a setup can name; each is a struct with a tag of its own."""
 
-FILTERS: dict[str, AnyFilter] = {"vqf": VqfFilter()}
+FILTERS: dict[str, AnyFilter] = {
+    "vqf": VqfFilter(),
+    "raw": RawFilter(),
+    "filter1": Filter1(),
+}
 
 
 class Device(msgspec.Struct, frozen=True):

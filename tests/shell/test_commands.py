@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from handstudio.cli import COMMANDS
+from handstudio.setup import FILTERS
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="uses POSIX signals and limits")
 
@@ -305,6 +306,14 @@ def test_an_error_is_no_trace_of_a_program(handstudio, tmp_path):
     assert said.code == 1
     assert said.out == ""
     assert len(said.err.splitlines()) == 2
+
+
+def test_a_take_can_be_fused_by_each_filter(here, take):
+    written = set()
+    for name in FILTERS:
+        assert here("process", take, "--filter", name, "--csv").code == 0
+        written.add(take.with_suffix(".angles.csv").read_bytes())
+    assert len(written) == len(FILTERS)
 
 
 def test_a_filter_nobody_has_is_refused_and_the_filters_are_named(here, take):
