@@ -1,0 +1,215 @@
+"""One trial of the accuracy bench: a virtual person does something, a filter follows, both compare.
+
+The pipeline sees events only; the truth is looked at when it is done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import msgspec
+import numpy as np
+
+from handstudio import pipeline
+from handstudio.analysis.hand_error import (
+    HandPoints,
+    SensorErrors,
+    angle_errors,
+    hand_points,
+    heading_scatter,
+    point_errors,
+    sensor_errors,
+)
+from handstudio.arrays import Array
+from handstudio.hand.angles import hand_angles
+from handstudio.hand.skeleton import SEGMENTS, HandSide
+from handstudio.kinematics import HandFit, angles_of, fit_of, measured_angles, pose_of
+from handstudio.layout import glove
+from handstudio.maths import so3
+from handstudio.recording.material import material
+from handstudio.setup import HandModel, Setup, filter_named
+from handstudio.simulation.imperfections.readout import MPU9250
+from handstudio.simulation.imperfections.strengths import Imperfections
+from handstudio.simulation.motions.actor import Actor
+from handstudio.simulation.motions.language import perform
+from handstudio.simulation.rig import Truth
+from handstudio.simulation.subject import Subject, subject
+from handstudio.simulation.trajectory import Trajectory
+from handstudio.simulation.worn import Worn, begin, sense, wear
+
+Calibration: TypeAlias = Literal["truth", "nominal"]
+"""What the pipeline is told of hand and mounting: all of it, or nothing but the hand's length."""
+
+RATE_HZ = 100
+_BLOCK = 1000  # instants simulated in one go
+_SETTLED_S = 3.0  # without a heading rotation: the first rest has been found by then
+_OPENING = ("static", "heading_rotation")
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What is tried."""
+
+    person: int
+    motion: str
+    imperfections: Imperfections
+    seed: int
+    filter: str = "vqf"
+    calibration: Calibration = "truth"
+    side: HandSide = "right"
+
+
+class Figures(msgspec.Struct, frozen=True):
+    """How far off a trial was, RMS over its instants [deg, mm]; names in the order of the layout.
+
+    Attributes:
+        seconds: Compared.
+        heading_offset_deg: Taken out of all orientations alike.
+        heading_sd_deg: Scatter of the sensors' mean headings.
+        sensors: Total, heading and inclination of every sensor.
+        segments: Total of every segment that carries a sensor.
+        angles: Of every joint angle.
+        tips_elbow, tips_hand: Of every fingertip, thumb to little finger.
+        places_elbow: Of every sensor, from the elbow.
+    """
+
+    seconds: float
+    heading_offset_deg: float
+    heading_sd_deg: float
+    sensors: dict[str, tuple[float, float, float]]
+    segments: dict[str, float]
+    angles: dict[str, float]
+    tips_elbow: tuple[float, ...]
+    tips_hand: tuple[float, ...]
+    places_elbow: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """A trial after the filter, before comparison."""
+
+    worn: Worn
+    setup: Setup
+    trajectory: Trajectory
+    truth: Truth
+    motion: pipeline.Motion
+    compared: Array = field(repr=False)  # which instants
+
+    @property
+    def fit(self) -> HandFit:
+        """Hand and mounting as they are."""
+        mounting, skeleton = self.worn.mounting, self.worn.subject.skeleton
+        return HandFit(skeleton, so3.conjugate(mounting.q_segment_sensor))
+
+
+def run(trial: Trial) -> Figures:
+    """Try it, and compare."""
+    return compare(follow(trial), trial.calibration)
+
+
+def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
+    """Let the person perform and the filter follow."""
+    someone = subject(trial.person, trial.side)
+    if performed is None:
+        performed = performance(someone, trial.motion, trial.seed)
+    worn = wear(someone, glove(trial.side), trial.imperfections, trial.seed)
+    setup = Setup(
+        worn.layout,
+        float(RATE_HZ),
+        float(MPU9250.mag_rate_hz),
+        filter=filter_named(trial.filter),
+        hand=HandModel(hand_length_m=someone.hand_length_m),
+    )
+    motions, truths = [], []
+    state, wearing = pipeline.begin(setup), begin(worn)
+    count = round(performed.duration_s * RATE_HZ)
+    for start in range(0, count, _BLOCK):
+        index = np.arange(start, min(start + _BLOCK, count))
+        sensed, wearing = sense(worn, wearing, performed, index * (1_000_000 // RATE_HZ), RATE_HZ)
+        motion, state = pipeline.run(setup, state, [sensed.samples])
+        motions.append(motion)
+        truths.append(sensed.truth)
+    truth = _joined(truths)
+    time_s = truth.time_us * 1e-6
+    return Followed(
+        worn, setup, performed, truth, pipeline.join(motions), time_s >= _begins_s(performed)
+    )
+
+
+def performance(someone: Subject, motion: str, seed: int) -> Trajectory:
+    """The motion of a trial."""
+    return perform(motion, Actor(someone, seed, material()))
+
+
+def compare(followed: Followed, calibration: Calibration) -> Figures:
+    """Hold what came out against what was true."""
+    part, truth = followed.compared, followed.truth
+    fit = followed.fit if calibration == "truth" else fit_of(followed.setup)
+    motion = _of(followed.motion, part)
+    sensors = sensor_errors(
+        followed.setup.layout.names, truth.q_world_sensor[part], motion.q_world_sensor
+    )
+    pose = pose_of(followed.setup, motion.q_world_sensor, fit)
+    driven = [SEGMENTS.index(name) for name in followed.setup.layout.drivers]
+    segments = sensor_errors(
+        [SEGMENTS[k] for k in driven],
+        truth.q_world_segment[part][:, driven],
+        pose.q_world_segment[:, driven],
+    )
+    known = measured_angles(followed.setup.layout)
+    columns = [hand_angles().index(angle) for angle in known]
+    angles = angle_errors(
+        [angle.name for angle in known],
+        truth.angles[part][:, columns],
+        angles_of(followed.setup, motion, known, fit),
+    )
+    elbow = truth.t_world_joint[part][:, :1]
+    hand = SEGMENTS.index("hand")
+    true_points = HandPoints(
+        truth.t_world_tip[part] - elbow,
+        truth.q_world_segment[part][:, hand],
+        truth.t_world_joint[part][:, hand] - elbow[:, 0],
+    )
+    tips = point_errors(true_points, hand_points(pose))
+    on = list(followed.worn.on)
+    # as if it knew where on the segment a sensor sits: how the hand is off, not the board
+    lever = so3.rotate(pose.q_world_segment[:, on], followed.worn.mounting.t_segment_sensor)
+    off = pose.t_world_joint[:, on] + lever - (truth.t_world_sensor[part] - elbow)
+    places = np.sqrt(np.mean(np.sum(off**2, axis=-1), axis=0)) * 1e3
+    return Figures(
+        seconds=int(part.sum()) / RATE_HZ,
+        heading_offset_deg=float(np.rad2deg(sensors.heading_offset)),
+        heading_sd_deg=_scatter(truth, motion, part),
+        sensors=_in_degrees(sensors),
+        segments={k: v[0] for k, v in _in_degrees(segments).items()},
+        angles=dict(zip(angles.names, np.rad2deg(angles.rmse).tolist(), strict=True)),
+        tips_elbow=tuple(1e3 * x for x in tips.from_elbow),
+        tips_hand=tuple(1e3 * x for x in tips.in_hand),
+        places_elbow=dict(zip(sensors.names, places.tolist(), strict=True)),
+    )
+
+
+def _scatter(truth: Truth, motion: pipeline.Motion, part: Array) -> float:
+    return float(np.rad2deg(heading_scatter(truth.q_world_sensor[part], motion.q_world_sensor)))
+
+
+def _in_degrees(found: SensorErrors) -> dict[str, tuple[float, float, float]]:
+    return {
+        name: tuple(float(np.rad2deg(x)) for x in (e.total, e.heading, e.inclination))  # type: ignore[misc]
+        for name, e in zip(found.names, found.errors, strict=True)
+    }
+
+
+def _begins_s(performed: Trajectory) -> float:
+    """When what is compared begins: after the rests and turns every recording opens with."""
+    opening = [span.end_s for span in performed.spans if span.name in _OPENING]
+    return max([_SETTLED_S, *opening]) if opening else _SETTLED_S
+
+
+def _of(motion: pipeline.Motion, part: Array) -> pipeline.Motion:
+    return pipeline.Motion(*(getattr(motion, name)[part] for name in pipeline.Motion.__slots__))
+
+
+def _joined(truths: list[Truth]) -> Truth:
+    return Truth(*(np.concatenate([getattr(t, name) for t in truths]) for name in Truth.__slots__))
