@@ -6,6 +6,8 @@ from functools import cache
 
 from handstudio.simulation.motions.actor import Actor, Motion
 from handstudio.simulation.motions.calibration import CALIBRATION
+from handstudio.simulation.motions.chores import CHORES
+from handstudio.simulation.motions.exercises import EXERCISES
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.trajectory import Trajectory
 
@@ -19,6 +21,8 @@ SHOWCASE = (Motion("showcase", "What a hand can do, in forty seconds", _showcase
 FAMILIES = (
     SHOWCASE,
     CALIBRATION,
+    EXERCISES,
+    CHORES,
 )
 
 

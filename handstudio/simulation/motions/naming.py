@@ -13,11 +13,12 @@ _SAME = {
     "mp": "mcp",
     "cm": "cmc",
     "flex": "flexion",
+    "extension": "flexion",
     "abd": "abduction",
     "adduction": "abduction",
     "pinky": "little",
 }
-_NOTHING = {"finger", "joint", "of", "the", "extension", "and"}
+_NOTHING = {"finger", "joint", "of", "the", "and"}
 """Said by many, and no part of a name."""
 
 
@@ -49,5 +50,5 @@ def resolve(text: str) -> str:
 def _words(text: str) -> tuple[str, ...]:
     words = [w for w in re.split(r"[^a-z0-9]+", text.lower()) if w]
     kept = [_SAME.get(word, word) for word in words if word not in _NOTHING]
-    # abduction and adduction are one motion
+    # flexion and extension are one motion, as are abduction and adduction
     return tuple(word for i, word in enumerate(kept) if word not in kept[:i])

@@ -81,12 +81,13 @@ def acted(
     motion: str,
     begin: Posture,
     steps: Script,
+    *,
     seconds: float | None = None,
     curve: Callable[[Array, Array], Trajectory] = through_reversals,
 ) -> Trajectory:
     """Go through postures as people do: no time and no angle twice quite the same.
 
-    Times vary by a tenth, angles by a twentieth; the same posture twice in a row is a hold.
+    Times vary by a tenth, angles by a twentieth; an angle that is named twice in a row is held.
 
     Args:
         begin: Posture at the start [deg].
@@ -96,15 +97,17 @@ def acted(
     """
     rng = actor.rng(motion)
     times, postures = [0.0], [_done(actor, begin)]
-    last = begin
+    last: Posture = begin
+    factors = dict.fromkeys(begin, 1.0)
     for step, posture in steps:
         times.append(times[-1] + step * float(np.clip(rng.normal(1.0, 0.1), 0.75, 1.3)))
-        if posture is last:
-            postures.append(postures[-1])
-        else:
-            factors = np.clip(rng.normal(1.0, 0.05, len(posture)), 0.88, 1.12)
-            varied = {n: v * f for (n, v), f in zip(posture.items(), factors, strict=True)}
-            postures.append(_done(actor, varied))
+        drawn = np.clip(rng.normal(1.0, 0.05, len(posture)), 0.88, 1.12)
+        # what stays, stays
+        factors = {
+            name: factors[name] if last.get(name) == value else float(new)
+            for (name, value), new in zip(posture.items(), drawn, strict=True)
+        }
+        postures.append(_done(actor, {n: v * factors[n] for n, v in posture.items()}))
         last = posture
     total = times[-1] if seconds is None else seconds
     at = np.round(np.array(times) * total / times[-1], 6)
