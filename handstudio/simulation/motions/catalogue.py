@@ -8,6 +8,7 @@ from handstudio.simulation.motions.actor import Actor, Motion
 from handstudio.simulation.motions.calibration import CALIBRATION
 from handstudio.simulation.motions.chores import CHORES
 from handstudio.simulation.motions.exercises import EXERCISES
+from handstudio.simulation.motions.recorded import RECORDED
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.trajectory import Trajectory
 
@@ -23,6 +24,7 @@ FAMILIES = (
     CALIBRATION,
     EXERCISES,
     CHORES,
+    RECORDED,
 )
 
 

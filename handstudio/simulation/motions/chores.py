@@ -1,6 +1,6 @@
 """What hands do all day, without anything in them; labelled work.
 
-Paces are ours, kept to what is known of people: a keystroke is 60 to 100 ms down and as much up, a
+Paces are ours, kept to what is known of people: a keystroke is 80 ms down and as much up, a
 throw whips the wrist at some 600 deg/s, a snap of the fingers is the fastest thing a hand does.
 """
 
@@ -65,8 +65,8 @@ def _typing(actor: Actor, _: str) -> Trajectory:
             over, down = _key_of(actor, home, finger, rng.uniform(-6.0, 6.0), rng.uniform(0.8, 1.2))
             north, west = (float(x) for x in rng.normal(0.0, _KEY_MM, 2))
             shift = {"elbow_north_mm": north, "elbow_west_mm": west}
-            steps += [(0.09, over | shift), (0.075, down | shift), (0.09, home | shift)]
-            spent += 0.255
+            steps += [(0.09, over | shift), (0.08, down | shift), (0.09, home | shift)]
+            spent += 0.26
         pause = float(rng.uniform(0.3, 1.1))
         steps += [(0.25, home), (pause, home)]
         spent += 0.25 + pause
@@ -81,7 +81,7 @@ def _key_of(
         over = {**home, "thumb_cmc_abduction": 6.0}
         return over, over | {"thumb_cmc_abduction": 6.0 + 9.0 * depth, "thumb_ip_flexion": 14.0}
     over = {**home, **bent(actor.subject, 19.0, 38.0, aside, [finger])}
-    struck = bent(actor.subject, 19.0 + 17.0 * depth, 38.0 - 4.0 * depth, aside, [finger])
+    struck = bent(actor.subject, 19.0 + 13.0 * depth, 38.0 - 3.0 * depth, aside, [finger])
     return over, over | struck
 
 
