@@ -13,9 +13,9 @@ What goes over is the angles, not the places: a subject has other bones. Per ins
 Angles that stand out from their neighbours are taken for faults of the recorder and bridged, as are
 gaps. All are then laid on even instants and low-passed at 8 Hz forwards and backwards (Butterworth,
 second order, so 4th in all and no delay): hands move slower, and recorders of this kind shake
-faster. An angle that leaves the subject's range is shifted by as little as brings it back, and where
-it goes through more than the range it is made smaller: nobody knows the zero of a recorder's palm
-and fingers, and cutting off would leave joints still that moved. A quintic spline goes through all.
+faster. An angle that leaves the subject's range is shifted by as little as brings it back, and one
+that goes through more than the range is made smaller: nobody knows the zero of a recorder's palm and
+fingers, and cutting off would leave joints still that moved. A quintic spline goes through all.
 """
 
 from __future__ import annotations
