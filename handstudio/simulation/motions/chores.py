@@ -1,7 +1,7 @@
 """What hands do all day, without anything in them; labelled work.
 
 Paces are ours, kept to what is known of people: a keystroke is 80 ms down and as much up, a
-throw whips the wrist at some 600 deg/s, a snap of the fingers is the fastest thing a hand does.
+throw whips the wrist at some 700 deg/s, a snap of the fingers is the fastest thing a hand does.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _ball_throw(actor: Actor, _: str) -> Trajectory:
     steps: Steps = []
     for _repeat in range(9):
         steps += [(0.7, held), (0.6, cocked), (0.25, cocked)]
-        steps += [(0.14, half), (0.17, thrown), (0.25, through), (0.6, ease), (0.4, ease)]
+        steps += [(0.115, half), (0.14, thrown), (0.22, through), (0.6, ease), (0.4, ease)]
     return labelled(acted(actor, "ball_throw", ease, steps, seconds=30.0), "work")
 
 

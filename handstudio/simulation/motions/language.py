@@ -48,7 +48,8 @@ def perform(text: str, actor: Actor) -> Trajectory:
     parts = []
     for number, layers in enumerate(parse(text)):
         # the same motion twice in a phrase is performed twice, not copied
-        first, *over = (_made(layer, actor, f"{number}.{i}") for i, layer in enumerate(layers))
+        place = f"{actor.place} {number}".strip()
+        first, *over = (_made(layer, actor, f"{place}.{i}") for i, layer in enumerate(layers))
         for other in over:
             first = layered(first, other)
         parts.append(first)

@@ -14,8 +14,8 @@ Angles that stand out from their neighbours are taken for faults of the recorder
 gaps. All are then laid on even instants and low-passed at 8 Hz forwards and backwards (Butterworth,
 second order, so 4th in all and no delay): hands move slower, and recorders of this kind shake
 faster. An angle that leaves the subject's range is shifted by as little as brings it back, and one
-that goes through more than the range is made smaller: nobody knows the zero of a recorder's palm and
-fingers, and cutting off would leave joints still that moved. A quintic spline goes through all.
+that goes through more than the range is made smaller: nobody knows the zero of a recorder's palm
+and fingers, and cutting off would leave joints still that moved. A quintic spline goes through all.
 """
 
 from __future__ import annotations
@@ -203,6 +203,10 @@ def _splined(even: Array, postures: Array) -> Trajectory:
 
 RECORDED = (
     Motion(
-        "recorded", "A real hand's motion, recorded elsewhere", _recorded, "name of a recording"
+        "recorded",
+        "A real hand's motion, recorded elsewhere",
+        _recorded,
+        "name of a recording",
+        example="pinch",
     ),
 )
