@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -13,7 +13,7 @@ from handstudio.arrays import Array
 from handstudio.errors import SetupError
 from handstudio.simulation.postures import Posture, Script, channels, scripted
 from handstudio.simulation.subject import Subject
-from handstudio.simulation.trajectory import Trajectory
+from handstudio.simulation.trajectory import Trajectory, joined
 
 Stroke: TypeAlias = Float[Array, "m 2"]
 """What a pen draws without being lifted: right and up, in heights of a character."""
@@ -26,7 +26,8 @@ class HandRecording:
     Attributes:
         time_s: Rising from 0.
         joints_m: Of thumb to little finger: base of the metacarpal (NaN where unknown), MCP, PIP,
-            DIP and tip, in a frame of the recorder (n, 5, 5, 3) [m].
+            DIP and tip, in a frame with z up and y away from the person; (n, 5, 5, 3) [m].
+            The thumb's IP stands for its PIP, and its DIP is NaN.
         palm: Palm frame of each instant as a matrix: columns point to the little finger's side of
             a right hand, to the fingers and out of the back of the hand; (n, 3, 3).
     """
@@ -101,6 +102,7 @@ class Motion:
         make: Performs it: the actor, and what stands behind the colon.
         argument: What stands behind the colon, for people; empty where nothing does.
         example: Of what stands there; empty where it may be left out.
+        of: The motions it is a row of, if it is one: manners act on each by itself.
     """
 
     name: str
@@ -108,8 +110,24 @@ class Motion:
     make: Callable[[Actor, str], Trajectory]
     argument: str = ""
     example: str = ""
+    of: tuple[Motion, ...] = ()
 
     @property
     def described(self) -> str:
         """One way to ask for it."""
         return f"{self.name}:{self.example}" if self.example else self.name
+
+
+def in_a_row(name: str, what: str, *of: Motion) -> Motion:
+    """A motion that is others, one after the other."""
+
+    def make(actor: Actor, _: str) -> Trajectory:
+        return joined([part.make(who, "") for who, part in taking_turns(actor, of)])
+
+    return Motion(name, what, make, of=of)
+
+
+def taking_turns(actor: Actor, of: Sequence[Motion]) -> Iterator[tuple[Actor, Motion]]:
+    """The actor at each of the places of a row."""
+    for place, part in enumerate(of):
+        yield actor.again(f"{actor.place}/{place}"), part

@@ -5,6 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from handstudio.simulation.motions.actor import Actor, Motion
+from handstudio.simulation.motions.calibration import CALIBRATION
+from handstudio.simulation.motions.chores import CHORES
+from handstudio.simulation.motions.exercises import EXERCISES
+from handstudio.simulation.motions.recorded import RECORDED
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.trajectory import Trajectory
 
@@ -15,8 +19,16 @@ def _showcase(actor: Actor, _: str) -> Trajectory:
 
 SHOWCASE = (Motion("showcase", "What a hand can do, in forty seconds", _showcase),)
 
+FAMILIES = (
+    SHOWCASE,
+    CALIBRATION,
+    EXERCISES,
+    CHORES,
+    RECORDED,
+)
+
 
 @cache
 def motions() -> dict[str, Motion]:
     """Motions by name, in the order they are told."""
-    return {motion.name: motion for motion in SHOWCASE}
+    return {motion.name: motion for family in FAMILIES for motion in family}

@@ -14,7 +14,7 @@ import re
 from dataclasses import dataclass
 
 from handstudio.errors import SetupError
-from handstudio.simulation.motions.actor import Actor, Motion
+from handstudio.simulation.motions.actor import Actor, Motion, taking_turns
 from handstudio.simulation.motions.catalogue import motions
 from handstudio.simulation.motions.manners import MANNERS
 from handstudio.simulation.trajectory import Trajectory, joined, layered
@@ -48,7 +48,8 @@ def perform(text: str, actor: Actor) -> Trajectory:
     parts = []
     for number, layers in enumerate(parse(text)):
         # the same motion twice in a phrase is performed twice, not copied
-        first, *over = (_made(layer, actor, f"{number}.{i}") for i, layer in enumerate(layers))
+        place = f"{actor.place} {number}".strip()
+        first, *over = (_made(layer, actor, f"{place}.{i}") for i, layer in enumerate(layers))
         for other in over:
             first = layered(first, other)
         parts.append(first)
@@ -120,11 +121,21 @@ def _made(layer: Layer, actor: Actor, place: str) -> Trajectory:
     takes = []
     for repeat in range(layer.times):
         this = actor.again(f"{place}.{repeat}")
-        part = layer.motion.make(this, layer.argument)
-        for manner in layer.manners:
-            part = MANNERS[manner].of(this, layer.motion.name, part)
-        takes.append(part)
+        takes.append(_in_manners(layer.motion, layer.argument, layer.manners, this))
     return joined(takes)
+
+
+def _in_manners(
+    motion: Motion, argument: str, manners: tuple[str, ...], actor: Actor
+) -> Trajectory:
+    """A motion done so; of a row of motions each by itself, as nobody is sloppy evenly."""
+    if motion.of:
+        turns = taking_turns(actor, motion.of)
+        return joined([_in_manners(part, "", manners, who) for who, part in turns])
+    done = motion.make(actor, argument)
+    for manner in manners:
+        done = MANNERS[manner].of(actor, motion.name, done)
+    return done
 
 
 def _not_understood(text: str, at: int) -> SetupError:

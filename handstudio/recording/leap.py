@@ -1,0 +1,167 @@
+"""Real hands as a Leap Motion controller recorded them, in the JSON of its playback tool.
+
+Places are millimetres, x to the right, y up, z towards the person. A finger's ``mcpPosition`` to
+``tipPosition`` are its joints; the thumb's ``mcpPosition`` is the base of its metacarpal and its
+``pipPosition`` the MCP, as the maker counts a metacarpal of no length before them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handstudio.arrays import Array
+from handstudio.errors import TakeError
+from handstudio.hand.skeleton import FINGERS
+from handstudio.simulation.motions.actor import HandRecording
+
+_JOINTS = ("mcpPosition", "pipPosition", "dipPosition", "tipPosition")
+_PLACES = {"thumb": (0, 1, 2, 4)}  # of these four among base, MCP, PIP, DIP and tip
+_PLACES_OF_FINGER = (1, 2, 3, 4)
+
+_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+def recordings_in(folder: Path) -> Mapping[str, Callable[[], HandRecording]]:
+    """Recordings of a folder by name, each read when asked for; none if there is no folder."""
+    return {path.stem: partial(read_leap, path) for path in sorted(folder.glob("*.json"))}
+
+
+def read_leap(path: Path) -> HandRecording:
+    """Read one recording: the hand that is seen longest in it.
+
+    Frames without that hand, or with a part of it missing, are left out.
+
+    Raises:
+        TakeError: the file cannot be read, is no such recording, or holds no hand.
+    """
+    frames = _frames(path)
+    seen = Counter(
+        hand.get("id") for frame in frames for hand in frame.get("hands") or () if _is(hand, dict)
+    )
+    if not seen:
+        raise TakeError(
+            "{path}: there is no hand in this recording.", "Choose another file.", path=path
+        )
+    hand_id = seen.most_common(1)[0][0]
+    found = [
+        (number, frame, hand)
+        for number, frame in enumerate(frames)
+        for hand in frame.get("hands") or ()
+        if _is(hand, dict) and hand.get("id") == hand_id
+    ]
+    rows = [_Row(path, number).read(frame, hand) for number, frame, hand in found]
+    whole = [row for row in rows if row is not None]
+    if len(whole) < 2:
+        raise TakeError(
+            "{path}: the hand is never seen whole in this recording.",
+            "Choose another file.",
+            path=path,
+        )
+    sides = {hand.get("type") for _, _, hand in found}
+    if len(sides) != 1 or not sides <= {"left", "right"}:
+        raise TakeError(
+            "{path}: the hand is said to be {sides}, not left or right.",
+            "Choose another file.",
+            path=path,
+            sides=" and ".join(sorted(str(side) for side in sides)),
+        )
+    time_s, joints, palm = (np.array(column) for column in zip(*whole, strict=True))
+    if np.any(np.diff(time_s) <= 0.0):
+        raise TakeError(
+            "{path}: the frames are not in the order of their time.",
+            "Choose another file.",
+            path=path,
+        )
+    return HandRecording(str(sides.pop()), time_s - time_s[0], joints, palm)
+
+
+def _frames(path: Path) -> list[dict[str, Any]]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise TakeError(
+            "{path}: no recording of a hand can be read ({reason}).",
+            "Choose a JSON file of Leap Motion's playback tool that is not compressed.",
+            path=path,
+            reason=error,
+        ) from error
+    frames = content.get("frames") if _is(content, dict) else None
+    if not _is(frames, list) or not frames or not all(_is(frame, dict) for frame in frames):
+        raise TakeError(
+            "{path}: this JSON holds no list of frames with names.",
+            "Choose a recording that was not packed.",
+            path=path,
+        )
+    return list(frames)
+
+
+class _Row:
+    """Reads one frame; what is wrong is told with its number."""
+
+    def __init__(self, path: Path, number: int) -> None:
+        self._path, self._number = path, number
+
+    def read(
+        self, frame: Mapping[str, Any], hand: Mapping[str, Any]
+    ) -> tuple[float, Array, Array] | None:
+        """Instant [s], joints [m] and palm with z up; None if a finger is missing."""
+        joints = np.full((len(FINGERS), 5, 3), np.nan)
+        seen = set()
+        for pointable in frame.get("pointables") or ():
+            if not _is(pointable, dict) or pointable.get("handId") != hand.get("id"):
+                continue
+            finger = pointable.get("type")
+            if finger not in range(len(FINGERS)):
+                continue  # a pen or another tool
+            places = _PLACES.get(FINGERS[finger], _PLACES_OF_FINGER)
+            for name, place in zip(_JOINTS, places, strict=True):
+                joints[finger, place] = self._vector(pointable, name) @ _Z_UP.T * 1e-3
+            seen.add(finger)
+        if len(seen) < len(FINGERS):
+            return None
+        return self._instant(frame), joints, self._palm(hand)
+
+    def _palm(self, hand: Mapping[str, Any]) -> Array:
+        forwards, palmar = (self._vector(hand, name) for name in ("direction", "palmNormal"))
+        across = np.cross(palmar, forwards)
+        lengths = [float(np.linalg.norm(v)) for v in (forwards, across)]
+        if min(lengths) < 1e-3:
+            raise self._wrong("direction and palmNormal, which are not square,")
+        y, x = forwards / lengths[0], across / lengths[1]
+        palm: Array = _Z_UP @ np.stack([x, y, np.cross(x, y)], axis=-1)
+        return palm
+
+    def _instant(self, frame: Mapping[str, Any]) -> float:
+        value = frame.get("timestamp")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+            raise self._wrong("timestamp")
+        return value * 1e-6
+
+    def _vector(self, of: Mapping[str, Any], name: str) -> Array:
+        try:
+            vector = np.array(of.get(name), dtype=float)
+        except (TypeError, ValueError):
+            vector = np.zeros(0)
+        if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+            raise self._wrong(name)
+        return vector
+
+    def _wrong(self, name: str) -> TakeError:
+        return TakeError(
+            "{path}, frame {number}: {name} is missing or makes no sense.",
+            "Choose another file, or take this frame out.",
+            path=self._path,
+            number=self._number,
+            name=name,
+        )
+
+
+def _is(value: object, kind: type) -> bool:
+    return isinstance(value, kind)
