@@ -43,8 +43,7 @@ Calibration: TypeAlias = Literal["truth", "nominal"]
 
 RATE_HZ = 100
 _BLOCK = 1000  # instants simulated in one go
-_SETTLED_S = 3.0  # without a heading rotation: the first rest has been found by then
-_OPENING = ("static", "heading_rotation")
+_SETTLED_S = 2.5  # without a heading rotation: the first rest has been found by then
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,9 +201,9 @@ def _in_degrees(found: SensorErrors) -> dict[str, tuple[float, float, float]]:
 
 
 def _begins_s(performed: Trajectory) -> float:
-    """When what is compared begins: after the rests and turns every recording opens with."""
-    opening = [span.end_s for span in performed.spans if span.name in _OPENING]
-    return max([_SETTLED_S, *opening]) if opening else _SETTLED_S
+    """When comparing begins: after the turn every recording opens with, or its first rest."""
+    turns = [span.end_s for span in performed.spans if span.name == "heading_rotation"]
+    return min(turns) if turns else _SETTLED_S
 
 
 def _of(motion: pipeline.Motion, part: Array) -> pipeline.Motion:
