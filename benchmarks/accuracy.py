@@ -176,13 +176,9 @@ def _budget(like: Trial, people: Sequence[int]) -> dict[str, Any]:
         cases[f"without {group}"] = msgspec.structs.replace(base, **dict.fromkeys(members, 0.0))
     for preset in ("plain", "harsh"):
         cases[preset] = PRESETS[preset]
+    briefly = replace(like, motion=SHORT)
     asked = [
-        (
-            case,
-            replace(
-                like, person=n, seed=like.seed - like.person + n, motion=SHORT, imperfections=i
-            ),
-        )
+        (case, replace(briefly, person=n, seed=like.seed - like.person + n, imperfections=i))
         for case, i in cases.items()
         for n in people
     ]

@@ -55,11 +55,10 @@ def picture(found: dict[str, Any], path: Path) -> None:
         }
         ranked = dict(sorted(alone.items(), key=lambda item: -item[1]))
         _bars(axes[1, 0], ranked, "Orientation with one imperfection alone")
-        axes[1, 0].axvline(found["budget"]["ideal"]["orientation_deg"], color="0.4", lw=1, ls="--")
-        axes[1, 0].axvline(found["budget"]["all"]["orientation_deg"], color="tab:red", lw=1)
-        axes[1, 0].annotate(
-            "all of them", (found["budget"]["all"]["orientation_deg"], 0), color="tab:red"
-        )
+        ideal, everything = (found["budget"][k]["orientation_deg"] for k in ("ideal", "all"))
+        axes[1, 0].axvline(ideal, color="0.4", lw=1, ls="--", label="none of them")
+        axes[1, 0].axvline(everything, color="tab:red", lw=1, label="all of them")
+        axes[1, 0].legend(loc="lower right")
     if "thesis_experiment" in found:
         _draw_thesis(axes[1, 1], found["thesis_experiment"])
     figure.suptitle(

@@ -1,8 +1,8 @@
 """The thesis's own experiment on virtual people, in its own metric; and its figures.
 
 S. 4.4 of the thesis this work began from: forearm, hand and index finger of one person, 100 Hz,
-every recording 2 s still, 2 s turned, then elbow, wrist and the index finger's joints in turn; RMSE of
-the three Euler angles, the initial attitude removed, as a norm. Tables 4.6 and 4.7.
+every recording 2 s still, 2 s turned, then elbow, wrist and the index finger's joints in turn;
+RMSE of the three Euler angles, the initial attitude removed, as a norm. Tables 4.6 and 4.7.
 """
 
 from __future__ import annotations
