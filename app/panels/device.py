@@ -24,12 +24,12 @@ class DevicePanel:
         self._choice = gui.add_dropdown(
             _("Device"), (_("Virtual glove"),), hint=_("Devices that were found")
         )
-        self._virtual = VirtualPanel(gui, send, self._wanted)
         self._address = gui.add_text(
             _("or address"),
             self._wanted if self._wanted.startswith(("tcp:", "replay:")) else "",
             hint=_("serial:/dev/ttyACM0, tcp:HOST:PORT or replay:TAKE.mcap"),
         )
+        self._virtual = VirtualPanel(gui, send, self._wanted)
         self._connect = gui.add_button(_("Connect"), icon=viser.Icon.PLUG_CONNECTED)
         self._find = gui.add_button(_("Look for devices"), icon=viser.Icon.REFRESH, color=QUIET)
         self._facts = gui.add_markdown("")
@@ -58,10 +58,10 @@ class DevicePanel:
         put(self._connect, label=_("Disconnect") if self._connected else _("Connect"))
         put(self._choice, disabled=self._connected)
         put(self._address, disabled=self._connected)
-        there = is_virtual(newest.address) if self._connected else False
+        worn = newest.address if self._connected and is_virtual(newest.address) else ""
         unheard = not self._connected and not self._address.value.strip()
         chosen = unheard and is_virtual(self._addresses.get(self._choice.value, ""))
-        self._virtual.render(chosen=there or chosen, connected=there)
+        self._virtual.render(worn, chosen=bool(worn) or chosen)
         looking = _("Looking …") if state.searching else _("Look for devices")
         put(self._find, label=looking, disabled=state.searching)
         self._render_facts(state)

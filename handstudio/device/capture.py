@@ -334,7 +334,7 @@ class Capture:
 
     def _hear_reply(self, reply: Reply) -> None:
         """Tell what a person asked for and the device will not do; the rest is asked again."""
-        if reply.result is Result.OK or reply.command in _OUR_OWN:
+        if reply.result == Result.OK or reply.command in _OUR_OWN:
             return
         self._reports.append(
             DeviceError(

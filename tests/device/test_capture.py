@@ -27,7 +27,9 @@ from handstudio.device.orders import (
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
 from handstudio.pipeline import Doubt
 from handstudio.process import process
+from handstudio.maths import so3
 from handstudio.protocol.codec import encode
+from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.decoder import V1Decoder
 from handstudio.protocol.packets import Command, ImuPacket, Request, Result
 from handstudio.recording.take import open_take
@@ -354,6 +356,25 @@ def test_what_is_no_command_is_reported_and_nothing_stops(studio, glove, command
     studio.until(lambda _: studio.reports, "a report")
     assert isinstance(studio.reports[0], HandstudioError)
     studio.go_on(20)
+
+
+def test_the_wearer_of_a_virtual_glove_does_what_is_asked_or_it_is_said_why_not(studio):
+    studio.connect("virtual:?seed=8&motion=rest:600")
+    first = studio.until(lambda newest: not newest.motion.doubt.any(), "every sensor is placed")
+    studio.send(Ask(PERFORM, b"showcase~fast"))
+
+    def moves(newest) -> bool:
+        turned = so3.angle_between(newest.motion.q_world_sensor, first.motion.q_world_sensor)
+        return bool(turned.max() > 0.5)
+
+    studio.until(moves, "the wearer moves")
+    assert studio.reports == []
+    studio.send(Ask(PERFORM, b"juggling"))
+    studio.until(lambda _: studio.reports, "a report")
+    (told,) = studio.reports
+    assert "juggling" in told.what
+    assert told.remedy
+    studio.go_on(5)
 
 
 def test_another_rate_is_another_setup_and_the_stream_goes_on(studio, glove):
