@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from handstudio.calibration.rest import REST_S, Rest, first_rest
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY, ImuSamples
-from handstudio.simulation.imperfections import MPU9250, Imperfections, read, switched_on
+from handstudio.simulation.imperfections import MPU9250, SensorKind, read, switched_on
 
 RATE_HZ = 100
 WINDOW = round(REST_S * RATE_HZ)
@@ -47,7 +47,7 @@ def still(n: int, bias_dps: object = (0.0, 0.0, 0.0)) -> ImuSamples:
     return turning(np.zeros((n, 3)), np.asarray(bias_dps))
 
 
-def noisy(exact: ImuSamples, rate_hz: int, seed: int, kind: Imperfections = MPU9250) -> ImuSamples:
+def noisy(exact: ImuSamples, rate_hz: int, seed: int, kind: SensorKind = MPU9250) -> ImuSamples:
     readings, _ = read(kind, seed, rate_hz, switched_on(exact.gyr.shape[1]), exact)
     si = readings.counts / 32768
     ranges = MPU9250.ranges

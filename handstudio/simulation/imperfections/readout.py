@@ -16,7 +16,7 @@ from handstudio.samples import FULL_SCALE, STANDARD_GRAVITY, ImuSamples, Ranges
 
 
 @dataclass(frozen=True, slots=True)
-class Imperfections:
+class SensorKind:
     """The kind of sensor. Densities are one-sided; rms are over sensors and axes.
 
     Attributes:
@@ -38,7 +38,7 @@ class Imperfections:
     acc_bias_rms: float
 
 
-MPU9250 = Imperfections(
+MPU9250 = SensorKind(
     ranges=Ranges(acc=8.0 * STANDARD_GRAVITY, gyr=float(np.deg2rad(2000.0)), mag=4912.0),
     # measured on 12 units of this kind at rest; the thesis's table 4.1 has 20 more: gyroscope
     # 6.2e-3 to 6.9e-3 deg/sqrt(s), a quarter above this, accelerometer less than half of this
@@ -80,7 +80,7 @@ class Readings:
     fresh: Bool[Array, "n s"]  # the magnetometer reading is new
 
 
-def draw_biases(kind: Imperfections, sensors: int, seed: int) -> Biases:
+def draw_biases(kind: SensorKind, sensors: int, seed: int) -> Biases:
     """The constant errors of a set of sensors; a seed is one set."""
     normal = _generator(seed, _BIASES).standard_normal((sensors, 6))
     return Biases(gyr=kind.gyr_bias_rms * normal[:, :3], acc=kind.acc_bias_rms * normal[:, 3:])
@@ -92,7 +92,7 @@ def switched_on(sensors: int) -> ReadoutState:
 
 
 def read(
-    kind: Imperfections,
+    kind: SensorKind,
     seed: int,
     rate_hz: int,
     state: ReadoutState,

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from handstudio.samples import FULL_SCALE, STANDARD_GRAVITY, ImuSamples
 from handstudio.simulation.imperfections import (
     MPU9250,
-    Imperfections,
     Readings,
+    SensorKind,
     draw_biases,
     read,
     switched_on,
@@ -28,9 +28,7 @@ def felt(n: int, rate_hz: int, sensors: int = 2, value: float = 0.0) -> ImuSampl
     return ImuSamples(time_us, vectors, vectors, vectors, flags, flags, ~flags)
 
 
-def counted(
-    exact: ImuSamples, rate_hz: int, kind: Imperfections = MPU9250, seed: int = 5
-) -> Readings:
+def counted(exact: ImuSamples, rate_hz: int, kind: SensorKind = MPU9250, seed: int = 5) -> Readings:
     return read(kind, seed, rate_hz, switched_on(exact.gyr.shape[1]), exact)[0]
 
 
