@@ -16,7 +16,7 @@ from jaxtyping import Float
 from handstudio.arrays import Array
 from handstudio.hand.angles import DEVIATION, FLEXION, ROTATION
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton
-from handstudio.simulation.moving import Moving, along, picked, turning
+from handstudio.simulation.moving import Moving, along, picked, planes_first, turning, vectors_last
 from handstudio.simulation.trajectory import JointMotion
 
 SQUARE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
@@ -72,7 +72,7 @@ def hand_moving(
         skeleton.q_parent_rest, skeleton.t_parent_joint
     )
     n, k = own.q.shape[:2]
-    out = Moving(*(np.moveaxis(np.empty((size, n, k)), 0, -1) for size in (4, 3, 3, 3, 3, 3)))
+    out = Moving(*(vectors_last(np.empty((size, n, k))) for size in (4, 3, 3, 3, 3, 3)))
     for children, parents in _GENERATIONS:
         if parents == [-1]:
             zero, (t, v, a) = np.zeros((n, 1, 3)), joints.elbow
@@ -98,7 +98,7 @@ def joint_turned(mechanism: Mechanism, turns: Float[Array, "*n k 3"]) -> tuple[A
 def _driven(mechanism: Mechanism, joints: JointMotion) -> list[tuple[Array, Array, Array]]:
     """Angle, rate and acceleration of each of the three turns, conjunct ones added."""
     motion = (joints.turns, joints.rates, joints.accelerations)
-    planes = [np.ascontiguousarray(np.moveaxis(s, -1, 0)) for s in motion]
+    planes = [np.ascontiguousarray(planes_first(s)) for s in motion]
     x, v, a = (s[FLEXION] for s in planes)
     out = []
     for turn in (FLEXION, DEVIATION, ROTATION):

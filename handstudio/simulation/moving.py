@@ -105,11 +105,22 @@ def turning(
     return Moving(q, through + arm, omega, v, alpha, cross(alpha, arm) + cross(omega, v))
 
 
+def planes_first(vectors: Float[Array, "*n d"]) -> Float[Array, "d *n"]:
+    """Components on the first axis: a view. What `np.moveaxis` does, in a tenth of its time."""
+    last = vectors.ndim - 1
+    return vectors.transpose(last, *range(last))
+
+
+def vectors_last(planes: Float[Array, "d *n"]) -> Float[Array, "*n d"]:
+    """Components on the last axis: a view, the inverse of `planes_first`."""
+    return planes.transpose(*range(1, planes.ndim), 0)
+
+
 def picked(moving: Moving, columns: list[int]) -> Moving:
     """Some of the frames (n, k), in this order."""
     return Moving(
         *(
-            np.moveaxis(np.take(np.moveaxis(getattr(moving, name), -1, 0), columns, axis=-1), 0, -1)
+            vectors_last(np.take(planes_first(getattr(moving, name)), columns, axis=-1))
             for name in _FIELDS
         )
     )
@@ -129,7 +140,7 @@ def cross(a: Float[Array, "*#n 3"], b: Float[Array, "*#n 3"]) -> Float[Array, "*
     np.subtract(x, az * by, out=out[0])
     np.subtract(az * bx, ax * bz, out=out[1])
     np.subtract(ax * by, ay * bx, out=out[2])
-    return np.moveaxis(out, 0, -1)
+    return vectors_last(out)
 
 
 def rotate(q: Float[Array, "*#n 4"], v: Float[Array, "*#n 3"]) -> Float[Array, "*n 3"]:
@@ -145,7 +156,7 @@ def rotate(q: Float[Array, "*#n 4"], v: Float[Array, "*#n 3"]) -> Float[Array, "
         np.multiply(w, t, out=out[i])
         out[i] += crossed
         out[i] += own
-    return np.moveaxis(out, 0, -1)
+    return vectors_last(out)
 
 
 def rotate_all(
@@ -162,13 +173,13 @@ def rotate_all(
         (xy + wz, 1.0 - (xx + zz), yz - wx),
         (xz - wy, yz + wx, 1.0 - (xx + yy)),
     )
-    a, b, c = np.stack([np.moveaxis(v, -1, 0) for v in vectors], axis=1)
+    a, b, c = np.stack([planes_first(v) for v in vectors], axis=1)
     out = np.empty((3, *np.broadcast_shapes(a.shape, w.shape)))
     for i, (ma, mb, mc) in enumerate(rows):
         np.multiply(ma, a, out=out[i])
         out[i] += mb * b
         out[i] += mc * c
-    return [np.moveaxis(out[:, i], 0, -1) for i in range(len(vectors))]
+    return [vectors_last(out[:, i]) for i in range(len(vectors))]
 
 
 def multiply(p: Float[Array, "*#n 4"], q: Float[Array, "*#n 4"]) -> Float[Array, "*n 4"]:
@@ -181,7 +192,7 @@ def multiply(p: Float[Array, "*#n 4"], q: Float[Array, "*#n 4"]) -> Float[Array,
     out[1] = pw * qx + px * qw + py * qz - pz * qy
     out[2] = pw * qy - px * qz + py * qw + pz * qx
     out[3] = pw * qz + px * qy - py * qx + pz * qw
-    return np.moveaxis(out, 0, -1)
+    return vectors_last(out)
 
 
 def from_axis_angle(axis: Float[Array, "*#n 3"], angle: Float[Array, "*n"]) -> Float[Array, "*n 4"]:
@@ -192,7 +203,7 @@ def from_axis_angle(axis: Float[Array, "*#n 3"], angle: Float[Array, "*n"]) -> F
     np.cos(half, out=out[0])
     for i in range(3):
         np.multiply(sine, axis[..., i], out=out[i + 1])
-    return np.moveaxis(out, 0, -1)
+    return vectors_last(out)
 
 
 def along(axis: Float[Array, "*#n 3"], length: Float[Array, "*n"]) -> Float[Array, "*n 3"]:
@@ -200,4 +211,4 @@ def along(axis: Float[Array, "*#n 3"], length: Float[Array, "*n"]) -> Float[Arra
     out = np.empty((3, *length.shape))
     for i in range(3):
         np.multiply(length, axis[..., i], out=out[i])
-    return np.moveaxis(out, 0, -1)
+    return vectors_last(out)
