@@ -16,7 +16,7 @@ from jaxtyping import Float
 from handstudio.arrays import Array
 from handstudio.hand.angles import DEVIATION, FLEXION, ROTATION
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton
-from handstudio.simulation.moving import Moving, turning
+from handstudio.simulation.moving import Moving, along, picked, planes_first, turning, vectors_last
 from handstudio.simulation.trajectory import JointMotion
 
 SQUARE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
@@ -59,8 +59,8 @@ def joints_moving(mechanism: Mechanism, joints: JointMotion) -> Moving:
         for turn, driven in enumerate(_driven(mechanism, joints))
     ]
     turned = moving[FLEXION].then(moving[DEVIATION]).then(moving[ROTATION])
-    flexion = (x[..., FLEXION, None] for x in (joints.turns, joints.rates, joints.accelerations))
-    t, v, a = (mechanism.rolling * x for x in flexion)
+    flexion = (x[..., FLEXION] for x in (joints.turns, joints.rates, joints.accelerations))
+    t, v, a = (along(mechanism.rolling, x) for x in flexion)
     return turned.slid(t, v, a)
 
 
@@ -68,10 +68,11 @@ def hand_moving(
     skeleton: Skeleton, mechanism: Mechanism, joints: JointMotion, q_world_start: Float[Array, "4"]
 ) -> Moving:
     """Every segment in the world, (n, k): down the tree, a generation at once."""
-    own = joints_moving(mechanism, joints)
+    own = joints_moving(mechanism, joints).seen_from(
+        skeleton.q_parent_rest, skeleton.t_parent_joint
+    )
     n, k = own.q.shape[:2]
-    vector = (n, k, 3)
-    out = Moving(np.empty((n, k, 4)), *(np.empty(vector) for _ in range(5)))
+    out = Moving(*(vectors_last(np.empty((size, n, k))) for size in (4, 3, 3, 3, 3, 3)))
     for children, parents in _GENERATIONS:
         if parents == [-1]:
             zero, (t, v, a) = np.zeros((n, 1, 3)), joints.elbow
@@ -80,9 +81,8 @@ def hand_moving(
                 np.tile(q_world_start, (n, 1, 1)), places[0], zero, places[1], zero, places[2]
             )
         else:
-            base = out[:, parents]
-        rest = base.carrying(skeleton.q_parent_rest[children], skeleton.t_parent_joint[children])
-        placed = rest.then(own[:, children])
+            base = picked(out, parents)
+        placed = base.then(picked(own, children))
         for name in Moving.__dataclass_fields__:
             getattr(out, name)[:, children] = getattr(placed, name)
     return out
@@ -97,10 +97,12 @@ def joint_turned(mechanism: Mechanism, turns: Float[Array, "*n k 3"]) -> tuple[A
 
 def _driven(mechanism: Mechanism, joints: JointMotion) -> list[tuple[Array, Array, Array]]:
     """Angle, rate and acceleration of each of the three turns, conjunct ones added."""
-    x, v, a = (s[..., FLEXION] for s in (joints.turns, joints.rates, joints.accelerations))
+    motion = (joints.turns, joints.rates, joints.accelerations)
+    planes = [np.ascontiguousarray(planes_first(s)) for s in motion]
+    x, v, a = (s[FLEXION] for s in planes)
     out = []
     for turn in (FLEXION, DEVIATION, ROTATION):
-        own = tuple(s[..., turn] for s in (joints.turns, joints.rates, joints.accelerations))
+        own = tuple(s[turn] for s in planes)
         if turn == FLEXION or not mechanism.conjunct.any():
             out.append((own[0], own[1], own[2]))
             continue

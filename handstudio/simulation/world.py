@@ -59,17 +59,24 @@ class World:
         """Magnetic field [µT] at places in the world [m]."""
         field = np.asarray(self.field_ut)
         if self.gradient_ut_m:
-            field = field + place_m @ np.asarray(self.gradient_ut_m).T
+            field = field + _times(np.asarray(self.gradient_ut_m), place_m)
         for dipole in self.dipoles:
             field = field + _of_dipole(dipole, place_m)
         return field
 
 
+def _times(gradient: Array, place_m: Array) -> Array:
+    # not ``@``: its digits depend on how many places are asked for at once
+    x, y, z = place_m[..., 0], place_m[..., 1], place_m[..., 2]
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in gradient], axis=-1)
+
+
 def _of_dipole(dipole: Dipole, place_m: Array) -> Array:
-    away = place_m - np.asarray(dipole.place_m)
+    x, y, z = (place_m[..., i] - dipole.place_m[i] for i in range(3))
+    a, b, c = dipole.moment_am2
     # nothing comes nearer to the middle of a magnet than its own size
-    distance = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 0.005)
-    moment = np.asarray(dipole.moment_am2)
-    along = (away @ moment)[..., None]
-    field: Array = _DIPOLE_UT_M3 * (3.0 * along * away / distance**5 - moment / distance**3)
-    return field
+    square = np.maximum(x * x + y * y + z * z, 0.005**2)
+    falling = _DIPOLE_UT_M3 / (square * np.sqrt(square))
+    along = 3.0 * (a * x + b * y + c * z) / square
+    parts = ((x, a), (y, b), (z, c))
+    return np.stack([falling * (along * away - moment) for away, moment in parts], axis=-1)

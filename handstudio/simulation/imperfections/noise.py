@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from handstudio.arrays import Array
 
-_BLOCK = 64  # instants that are drawn together; changing it changes every stream
+BLOCK = 64  # instants that are drawn together; changing it changes every stream
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
@@ -19,10 +19,10 @@ def normals(
     seed: int, stream: int, first: int, n: int, shape: tuple[int, ...]
 ) -> Float[Array, "n ..."]:
     """Standard normals of the instants from ``first`` on, (n, *shape)."""
-    start, stop = first // _BLOCK, -(-(first + n) // _BLOCK)
+    start, stop = first // BLOCK, -(-(first + n) // BLOCK)
     blocks = [
-        generator(seed, stream, block).standard_normal((_BLOCK, *shape))
+        generator(seed, stream, block).standard_normal((BLOCK, *shape))
         for block in range(start, stop)
     ]
-    skip = first - start * _BLOCK
+    skip = first - start * BLOCK
     return np.concatenate(blocks)[skip : skip + n]
