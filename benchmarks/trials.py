@@ -33,6 +33,7 @@ from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import Imperfections
 from handstudio.simulation.motions.actor import Actor
 from handstudio.simulation.motions.language import perform
+from handstudio.simulation.mounting import segment_indices
 from handstudio.simulation.rig import Truth
 from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
@@ -171,7 +172,7 @@ def compare(followed: Followed, calibration: Calibration) -> Figures:
         truth.t_world_joint[part][:, hand] - elbow[:, 0],
     )
     tips = point_errors(true_points, hand_points(pose))
-    on = list(followed.worn.on)
+    on = segment_indices(followed.setup.layout)
     # as if it knew where on the segment a sensor sits: how the hand is off, not the board
     lever = so3.rotate(pose.q_world_segment[:, on], followed.worn.mounting.t_segment_sensor)
     off = pose.t_world_joint[:, on] + lever - (truth.t_world_sensor[part] - elbow)

@@ -14,7 +14,8 @@ from handstudio.recording.material import material
 from handstudio.recording.simulated import rehearse
 from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.shell import out, print_json, print_table, progress
-from handstudio.simulation.imperfections.strengths import NAMES, PRESETS, parse
+from handstudio.simulation.imperfections.strengths import PRESETS, parse
+from handstudio.simulation.imperfections.table import TABLE
 from handstudio.simulation.motions.catalogue import motions as all_motions
 from handstudio.simulation.motions.manners import MANNERS
 
@@ -33,20 +34,21 @@ def motions(*, json: Json = False) -> int:
                 "motions": {name: one.what for name, one in known.items()},
                 "manners": {name: one.what for name, one in MANNERS.items()},
                 "recordings": recordings,
-                "imperfections": list(NAMES),
+                "imperfections": {one.name: one._asdict() for one in TABLE},
                 "presets": list(PRESETS),
             }
         )
         return 0
     rows = [
-        [f"{name}:{one.argument.upper()}" if one.argument else name, one.what]
+        [one.described, f"{one.what} (:{one.argument})" if one.argument else one.what]
         for name, one in known.items()
     ]
     print_table("Motions", ["name", "what is done"], rows)
     if recordings:
         out.print(f"Recordings of real hands: {', '.join(recordings)}\n")
     print_table("Manners", ["~", "how"], [[name, one.what] for name, one in MANNERS.items()])
-    print_table("Imperfections", ["name"], [[name] for name in NAMES])
+    errors = [[one.name, one.what, one.size] for one in TABLE]
+    print_table("Imperfections", ["name", "what", "at strength 1"], errors)
     out.print(f"Sets of them: {', '.join(PRESETS)}")
     out.print(
         "\nOne after the other: calibration+open_close. At the same time: typing&elbow_moving. "

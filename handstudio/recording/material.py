@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
+from handstudio.recording.leap import recordings_in
 from handstudio.simulation.motions.actor import Material
 
 RECORDINGS = "HANDSTUDIO_DATA"
@@ -10,4 +14,5 @@ RECORDINGS = "HANDSTUDIO_DATA"
 
 def material() -> Material:
     """Everything there is on this machine."""
-    return Material()
+    folder = os.environ.get(RECORDINGS)
+    return Material(recordings=recordings_in(Path(folder) / "leap") if folder else {})

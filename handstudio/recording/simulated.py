@@ -43,7 +43,7 @@ from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.worn import Worn, begin, sense, wear
 from handstudio.stream import EventStream
 
-_STEP_US = 50_000  # of the glove's time in one chunk
+_STEP_US = 100_000  # of the glove's time in one chunk
 _READ_AHEAD = 1000  # instants
 _ROOM = 1 << 24  # bytes: an offline line drops nothing
 

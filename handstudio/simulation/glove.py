@@ -16,6 +16,7 @@ from handstudio.samples import STANDARD_GRAVITY
 from handstudio.simulation.firmware import Readings
 from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import PLAIN, Imperfections
+from handstudio.simulation.line import LineState, line_of, passed
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.subject import Subject, ideal_subject
 from handstudio.simulation.trajectory import Trajectory, turned_to
@@ -29,11 +30,12 @@ class Wire:
     """The way of a device's frames to the host, lossy as the imperfections have it."""
 
     def __init__(self, imperfections: Imperfections, seed: int) -> None:
-        self._imperfections, self._seed = imperfections, seed
+        self._line, self._state = line_of(imperfections, seed), LineState()
 
     def carry(self, frame: bytes) -> bytes:
         """What arrives of a frame."""
-        return frame
+        arrived, self._state = passed(self._line, self._state, [frame])
+        return b"".join(arrived)
 
 
 class WornGlove:

@@ -25,9 +25,9 @@ from handstudio.device.orders import (
     TakeDone,
 )
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
+from handstudio.maths import so3
 from handstudio.pipeline import Doubt
 from handstudio.process import process
-from handstudio.maths import so3
 from handstudio.protocol.codec import encode
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.decoder import V1Decoder
