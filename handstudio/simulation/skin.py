@@ -90,12 +90,12 @@ class Wobble:
     Attributes:
         z: ``d' - conj(pole) d`` of the displacement d [m/s].
         drive: The acceleration that drove them last [m/s²].
-        time_s: When; before the first instant: NaN.
+        time_s: When; None before the first instant.
     """
 
     z: Complex[Array, "s 3"]
     drive: Float[Array, "s 3"]
-    time_s: float
+    time_s: float | None
 
 
 def skin_of(
@@ -147,7 +147,7 @@ def skin_of(
 def settled(skin: Skin) -> Wobble:
     """Boards that hang still."""
     s = len(skin.on)
-    return Wobble(np.zeros((s, 3), dtype=complex), np.zeros((s, 3)), float("nan"))
+    return Wobble(np.zeros((s, 3), dtype=complex), np.zeros((s, 3)), None)
 
 
 def on_skin(
@@ -266,7 +266,7 @@ def _swung(
 
     ``d'' = u - 2 D w d' - w² d`` is ``z' = pole z + u`` with ``z = d' - conj(pole) d``.
     """
-    dt = np.diff(time_s, prepend=wobble.time_s if np.isfinite(wobble.time_s) else time_s[0])
+    dt = np.diff(time_s, prepend=time_s[0] if wobble.time_s is None else wobble.time_s)
     x = poles * dt[:, None]
     decay, still = np.exp(x), dt[:, None] == 0.0
     divisor = np.where(still, 1.0, x)
