@@ -33,7 +33,7 @@ def _ball_throw(actor: Actor, _: str) -> Trajectory:
     steps: Steps = []
     for _repeat in range(9):
         steps += [(0.7, held), (0.6, cocked), (0.25, cocked)]
-        steps += [(0.115, half), (0.14, thrown), (0.22, through), (0.6, ease), (0.4, ease)]
+        steps += [(0.12, half), (0.15, thrown), (0.22, through), (0.6, ease), (0.4, ease)]
     return labelled(acted(actor, "ball_throw", ease, steps, seconds=30.0), "work")
 
 
@@ -129,7 +129,7 @@ def _spinning_top(actor: Actor, _: str) -> Trajectory:
     away |= {"elbow_up_mm": 30.0}
     steps: Steps = []
     for _repeat in range(3):
-        steps += [(0.9, taken), (0.3, taken), (0.5, wound), (0.15, wound), (0.065, snapped)]
+        steps += [(0.9, taken), (0.3, taken), (0.5, wound), (0.15, wound), (0.1, snapped)]
         steps += [(0.05, snapped), (0.3, away), (1.0, away)]
     return labelled(acted(actor, "spinning_top", ease, [*steps, (0.8, ease)]), "work")
 

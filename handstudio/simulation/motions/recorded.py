@@ -80,7 +80,8 @@ def replayed(recording: HandRecording, actor: Actor) -> Trajectory:
     low_pass = butter(2, LOW_PASS_HZ, fs=1.0 / _EVERY_S, output="sos")
     smooth = {}
     for name, values in angles.items():
-        sound = np.isfinite(values) & ~_outliers(values)
+        sound = np.isfinite(values)
+        sound[sound] = ~_outliers(values[sound])
         if np.count_nonzero(sound) < 2:
             raise SetupError(
                 "The recording of a hand has nothing of {name}.",
@@ -167,9 +168,8 @@ def _of_palm(q_start_palm: Float[Array, "n 4"]) -> dict[str, Array]:
 
 def _outliers(values: Array) -> Array:
     """What stands out from the median of its neighbours (Hampel's rule)."""
-    known = np.where(np.isfinite(values), values, np.nanmedian(values))
-    middle = median_filter(known, _NEIGHBOURS, mode="nearest")
-    away = np.abs(known - middle)
+    middle = median_filter(values, _NEIGHBOURS, mode="nearest")
+    away = np.abs(values - middle)
     spread = 1.4826 * median_filter(away, _NEIGHBOURS, mode="nearest")
     outliers: Array = away > np.maximum(_STANDS_OUT * spread, _STANDS_OUT_RAD)
     return outliers
