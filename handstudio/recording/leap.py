@@ -64,7 +64,7 @@ def read_leap(path: Path) -> HandRecording:
             "{path}: the hand is said to be {sides}, not left or right.",
             "Choose another file.",
             path=path,
-            sides=" and ".join(sorted(sides)),
+            sides=", ".join(sorted(sides)),
         )
     time_s, joints, palm = (np.array(column) for column in zip(*whole, strict=True))
     if np.any(np.diff(time_s) <= 0.0):
@@ -132,7 +132,12 @@ class _Row:
         across = np.cross(palmar, forwards)
         lengths = [float(np.linalg.norm(v)) for v in (forwards, across)]
         if not all(1e-3 < length < 1e6 for length in lengths):
-            raise self._wrong("direction and palmNormal, which are not square,")
+            raise TakeError(
+                "{path}, frame {number}: direction and palmNormal of the hand give no palm.",
+                "Choose another file, or take this frame out.",
+                path=self._path,
+                number=self._number,
+            )
         y, x = forwards / lengths[0], across / lengths[1]
         palm: Array = _Z_UP @ np.stack([x, y, np.cross(x, y)], axis=-1)
         return palm

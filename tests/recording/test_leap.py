@@ -119,7 +119,7 @@ THIRD, HAND, FINGER = ("frames", 3), ("frames", 3, "hands", 0), ("frames", 3, "p
         (float("nan"), (*THIRD, "timestamp"), "frame 3: timestamp is missing"),
         (10**400, (*THIRD, "timestamp"), "frame 3: timestamp is missing"),
         (1, (*THIRD, "timestamp"), "the frames are not in the order of their time"),
-        ("both", (*HAND, "type"), "the hand is said to be both and right"),
+        ("both", (*HAND, "type"), "the hand is said to be both, right"),
         ([["id", "timestamp"], [1, 2]], ("frames",), "holds no list of frames with names"),
         ([], ("frames",), "holds no list of frames with names"),
         (None, ("frames",), "holds no list of frames with names"),

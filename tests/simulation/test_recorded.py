@@ -153,7 +153,7 @@ def test_a_recording_is_asked_for_by_its_name():
     with pytest.raises(SetupError, match="There is no recording of a hand called 'pinch'") as told:
         perform("recorded:pinch", Actor(subject(3), material=material))
     assert "wave" in told.value.remedy
-    with pytest.raises(SetupError, match="no recording of a hand called ''"):
+    with pytest.raises(SetupError, match="There are no recordings of hands"):
         perform("recorded", Actor(subject(3)))
 
 

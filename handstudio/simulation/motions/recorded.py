@@ -51,12 +51,17 @@ _MIRROR = np.array([-1.0, 1.0, 1.0])
 
 def _recorded(actor: Actor, argument: str) -> Trajectory:
     known = actor.material.recordings
+    if not known:
+        raise SetupError(
+            "There are no recordings of hands to play.",
+            "Put some in the folder leap of the folder that HANDSTUDIO_DATA names.",
+        )
     if argument not in known:
         raise SetupError(
             "There is no recording of a hand called {name!r}.",
             "Choose one of: {known}.",
             name=argument,
-            known=", ".join(known) or "(none is at hand)",
+            known=", ".join(known),
         )
     return labelled(replayed(known[argument](), actor), "work")
 
