@@ -42,20 +42,14 @@ def read_leap(path: Path) -> HandRecording:
         TakeError: the file cannot be read, is no such recording, or holds no hand.
     """
     frames = _frames(path)
-    seen = Counter(
-        hand.get("id") for frame in frames for hand in frame.get("hands") or () if _is(hand, dict)
-    )
+    hands = [(n, frame, hand) for n, frame in enumerate(frames) for hand in _parts(frame, "hands")]
+    seen = Counter(hand["id"] for _, _, hand in hands if isinstance(hand.get("id"), int | str))
     if not seen:
         raise TakeError(
             "{path}: there is no hand in this recording.", "Choose another file.", path=path
         )
     hand_id = seen.most_common(1)[0][0]
-    found = [
-        (number, frame, hand)
-        for number, frame in enumerate(frames)
-        for hand in frame.get("hands") or ()
-        if _is(hand, dict) and hand.get("id") == hand_id
-    ]
+    found = [(number, frame, hand) for number, frame, hand in hands if hand.get("id") == hand_id]
     rows = [_Row(path, number).read(frame, hand) for number, frame, hand in found]
     whole = [row for row in rows if row is not None]
     if len(whole) < 2:
@@ -64,13 +58,13 @@ def read_leap(path: Path) -> HandRecording:
             "Choose another file.",
             path=path,
         )
-    sides = {hand.get("type") for _, _, hand in found}
+    sides = {str(hand.get("type")) for _, _, hand in found}
     if len(sides) != 1 or not sides <= {"left", "right"}:
         raise TakeError(
             "{path}: the hand is said to be {sides}, not left or right.",
             "Choose another file.",
             path=path,
-            sides=" and ".join(sorted(str(side) for side in sides)),
+            sides=", ".join(sorted(sides)),
         )
     time_s, joints, palm = (np.array(column) for column in zip(*whole, strict=True))
     if np.any(np.diff(time_s) <= 0.0):
@@ -79,7 +73,7 @@ def read_leap(path: Path) -> HandRecording:
             "Choose another file.",
             path=path,
         )
-    return HandRecording(str(sides.pop()), time_s - time_s[0], joints, palm)
+    return HandRecording(sides.pop(), time_s - time_s[0], joints, palm)
 
 
 def _frames(path: Path) -> list[dict[str, Any]]:
@@ -92,14 +86,20 @@ def _frames(path: Path) -> list[dict[str, Any]]:
             path=path,
             reason=error,
         ) from error
-    frames = content.get("frames") if _is(content, dict) else None
-    if not _is(frames, list) or not frames or not all(_is(frame, dict) for frame in frames):
+    frames = content.get("frames") if isinstance(content, dict) else None
+    if not isinstance(frames, list) or not frames or not isinstance(frames[0], dict):
         raise TakeError(
             "{path}: this JSON holds no list of frames with names.",
             "Choose a recording that was not packed.",
             path=path,
         )
-    return list(frames)
+    return [frame if isinstance(frame, dict) else {} for frame in frames]
+
+
+def _parts(frame: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    """Hands or fingers of a frame, whatever it holds there."""
+    parts = frame.get(name)
+    return [part for part in parts if isinstance(part, dict)] if isinstance(parts, list) else []
 
 
 class _Row:
@@ -114,12 +114,11 @@ class _Row:
         """Instant [s], joints [m] and palm with z up; None if a finger is missing."""
         joints = np.full((len(FINGERS), 5, 3), np.nan)
         seen = set()
-        for pointable in frame.get("pointables") or ():
-            if not _is(pointable, dict) or pointable.get("handId") != hand.get("id"):
-                continue
+        for pointable in _parts(frame, "pointables"):
             finger = pointable.get("type")
-            if finger not in range(len(FINGERS)):
-                continue  # a pen or another tool
+            of_hand = pointable.get("handId") == hand.get("id")
+            if not of_hand or not isinstance(finger, int) or finger not in range(len(FINGERS)):
+                continue  # another hand's, a pen or another tool
             places = _PLACES.get(FINGERS[finger], _PLACES_OF_FINGER)
             for name, place in zip(_JOINTS, places, strict=True):
                 joints[finger, place] = self._vector(pointable, name) @ _Z_UP.T * 1e-3
@@ -132,22 +131,31 @@ class _Row:
         forwards, palmar = (self._vector(hand, name) for name in ("direction", "palmNormal"))
         across = np.cross(palmar, forwards)
         lengths = [float(np.linalg.norm(v)) for v in (forwards, across)]
-        if min(lengths) < 1e-3:
-            raise self._wrong("direction and palmNormal, which are not square,")
+        if not all(1e-3 < length < 1e6 for length in lengths):
+            raise TakeError(
+                "{path}, frame {number}: direction and palmNormal of the hand give no palm.",
+                "Choose another file, or take this frame out.",
+                path=self._path,
+                number=self._number,
+            )
         y, x = forwards / lengths[0], across / lengths[1]
         palm: Array = _Z_UP @ np.stack([x, y, np.cross(x, y)], axis=-1)
         return palm
 
     def _instant(self, frame: Mapping[str, Any]) -> float:
         value = frame.get("timestamp")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        try:
+            seconds = float(value) * 1e-6 if isinstance(value, int | float) else np.nan
+        except OverflowError:
+            seconds = np.nan
+        if not np.isfinite(seconds):
             raise self._wrong("timestamp")
-        return value * 1e-6
+        return seconds
 
     def _vector(self, of: Mapping[str, Any], name: str) -> Array:
         try:
             vector = np.array(of.get(name), dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             vector = np.zeros(0)
         if vector.shape != (3,) or not np.all(np.isfinite(vector)):
             raise self._wrong(name)
@@ -161,7 +169,3 @@ class _Row:
             number=self._number,
             name=name,
         )
-
-
-def _is(value: object, kind: type) -> bool:
-    return isinstance(value, kind)

@@ -38,7 +38,13 @@ SIGNS = {
 }
 # Fastest [deg/s]. Joints of people reach more in sports than here: an elbow over 2000 in pitching;
 # what is asked is that calm motions stay calm. The others are chores.
-FASTEST = {"ball_throw": 900.0, "typing": 700.0, "tissue": 700.0, "open_close": 700.0}
+FASTEST = {
+    "ball_throw": 900.0,
+    "spinning_top": 1400.0,
+    "typing": 700.0,
+    "tissue": 700.0,
+    "open_close": 700.0,
+}
 CALM = 600.0
 
 everyone = pytest.mark.parametrize("number", [0, 3, 8, 104])
@@ -120,10 +126,7 @@ def test_joints_turn_at_a_human_pace(name):
     part = done(name)
     rates = part.derivatives(np.arange(0.0, part.duration_s, 0.002))[1]
     fastest = np.rad2deg(np.abs(rates[:, :-3]).max())
-    if name == "spinning_top":
-        assert 1000.0 < fastest < 2000.0
-    else:
-        assert fastest < FASTEST.get(name, CALM)
+    assert fastest < FASTEST.get(name, CALM)
 
 
 @single
@@ -268,7 +271,7 @@ def test_the_elbow_swings_by_some_centimetres_at_some_tenths_of_g(axis):
     np.testing.assert_array_equal(travel > 0.0, moves)
     assert np.all((travel[moves] > 0.05) & (travel[moves] < 0.15))
     assert 0.08 < np.linalg.norm(acceleration, axis=-1).max() / 9.81 < 0.45
-    assert place[:, 2].min() > -1e-5  # the table is below
+    assert place[:, 2].min() > -1e-4  # the table is below
 
 
 def test_the_elbow_waits_if_it_is_told_to():
@@ -279,13 +282,14 @@ def test_the_elbow_waits_if_it_is_told_to():
     assert np.ptp(place[400:, 2]) > 0.05
 
 
-def test_a_throw_turns_the_fingers_by_about_a_thousand_degrees_a_second():
-    part, who = done("ball_throw"), someone(3)
-    omega = segments(part, np.arange(0.0, 30.0, 0.005), who).omega[
-        :, SEGMENTS.index("index_distal")
-    ]
-    fastest = np.rad2deg(np.linalg.norm(omega, axis=-1).max())
-    assert 800.0 < fastest < 1900.0  # and a sensor of 2000 deg/s still sees it
+@pytest.mark.parametrize(
+    ("name", "least", "most"), [("ball_throw", 800.0, 1900.0), ("spinning_top", 1200.0, 3000.0)]
+)
+def test_fingers_turn_by_more_than_a_thousand_degrees_a_second(name, least, most):
+    part, who = done(name), someone(3)
+    moving = segments(part, np.arange(0.0, part.duration_s, 0.005), who)
+    omega = moving.omega[:, SEGMENTS.index("index_distal")]
+    assert least < np.rad2deg(np.linalg.norm(omega, axis=-1).max()) < most
 
 
 def test_who_rests_is_almost_still():

@@ -1,7 +1,7 @@
 """What hands do all day, without anything in them; labelled work.
 
 Paces are ours, kept to what is known of people: a keystroke is 80 ms down and as much up, a
-throw whips the wrist at some 700 deg/s, a snap of the fingers is the fastest thing a hand does.
+throw turns the fingers by some 1000 deg/s, a snap of them is the fastest thing a hand does.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ def _ball_throw(actor: Actor, _: str) -> Trajectory:
     ball = bent(actor.subject, 40.0, 42.0) | thumb(8.0, 35.0, 20.0, 25.0)
     held = ease | ball
     cocked = held | {"elbow_flexion": 95.0, "wrist_flexion": -40.0, "elbow_rotation": -12.0}
-    # the wrist follows the elbow, and the fingers open on the way
-    half = held | {"elbow_flexion": 62.0, "wrist_flexion": -28.0, "elbow_up_mm": 20.0}
-    thrown = ease | bent(actor.subject, 5.0, 8.0) | thumb(-8.0, 20.0, 5.0, 5.0)
-    thrown |= {"elbow_flexion": 28.0, "wrist_flexion": 28.0, "elbow_up_mm": 35.0}
-    through = thrown | bent(actor.subject, 25.0, 25.0)
-    through |= {"elbow_flexion": 20.0, "wrist_flexion": 35.0, "elbow_up_mm": 15.0}
+    # the wrist follows the elbow, and the fingers let go on the way
+    half = held | bent(actor.subject, 28.0, 26.0) | {"elbow_flexion": 64.0, "wrist_flexion": -14.0}
+    half |= {"elbow_up_mm": 20.0}
+    thrown = ease | bent(actor.subject, 26.0, 24.0) | thumb(-8.0, 20.0, 5.0, 5.0)
+    thrown |= {"elbow_flexion": 24.0, "wrist_flexion": 28.0, "elbow_up_mm": 35.0}
+    through = thrown | bent(actor.subject, 34.0, 28.0)
+    through |= {"elbow_flexion": 17.0, "wrist_flexion": 40.0, "elbow_up_mm": 15.0}
     steps: Steps = []
     for _repeat in range(9):
         steps += [(0.7, held), (0.6, cocked), (0.25, cocked)]
-        steps += [(0.115, half), (0.14, thrown), (0.22, through), (0.6, ease), (0.4, ease)]
+        steps += [(0.14, half), (0.13, thrown), (0.18, through), (0.6, ease), (0.4, ease)]
     return labelled(acted(actor, "ball_throw", ease, steps, seconds=30.0), "work")
 
 
@@ -129,7 +130,7 @@ def _spinning_top(actor: Actor, _: str) -> Trajectory:
     away |= {"elbow_up_mm": 30.0}
     steps: Steps = []
     for _repeat in range(3):
-        steps += [(0.9, taken), (0.3, taken), (0.5, wound), (0.15, wound), (0.065, snapped)]
+        steps += [(0.9, taken), (0.3, taken), (0.5, wound), (0.15, wound), (0.1, snapped)]
         steps += [(0.05, snapped), (0.3, away), (1.0, away)]
     return labelled(acted(actor, "spinning_top", ease, [*steps, (0.8, ease)]), "work")
 

@@ -9,6 +9,7 @@ from handstudio.errors import SetupError
 from handstudio.simulation.motions.catalogue import motions
 from handstudio.simulation.motions.language import parse
 
+# flexion and extension are one motion, as are abduction and adduction
 _SAME = {
     "mp": "mcp",
     "cm": "cmc",
@@ -28,27 +29,26 @@ def resolve(text: str) -> str:
     Raises:
         SetupError: it is neither.
     """
-    spoken = {_words(name): name for name in motions()}
+    spoken = {frozenset(_words(name)): name for name in motions()}
     said = _words(text)
-    if said in spoken:
-        return spoken[said]
+    if frozenset(said) in spoken:
+        return spoken[frozenset(said)]
     try:
         parse(text)
     except SetupError:
-        near = get_close_matches(" ".join(said), [" ".join(words) for words in spoken], n=3)
+        by_words = {" ".join(_words(name)): name for name in motions()}
+        near = get_close_matches(" ".join(said), list(by_words), n=3)
         if not near:
             raise
         raise SetupError(
             "There is no motion {name!r}.",
             "Nearest are {near}; see handstudio motions for all.",
             name=text,
-            near=", ".join(spoken[tuple(name.split(" "))] for name in near),
+            near=", ".join(by_words[words] for words in near),
         ) from None
     return text.strip()
 
 
-def _words(text: str) -> tuple[str, ...]:
-    words = [w for w in re.split(r"[^a-z0-9]+", text.lower()) if w]
-    kept = [_SAME.get(word, word) for word in words if word not in _NOTHING]
-    # flexion and extension are one motion, as are abduction and adduction
-    return tuple(word for i, word in enumerate(kept) if word not in kept[:i])
+def _words(text: str) -> list[str]:
+    words = [word for word in re.split(r"[^a-z0-9]+", text.lower()) if word]
+    return [_SAME.get(word, word) for word in words if word not in _NOTHING]

@@ -51,12 +51,17 @@ _MIRROR = np.array([-1.0, 1.0, 1.0])
 
 def _recorded(actor: Actor, argument: str) -> Trajectory:
     known = actor.material.recordings
+    if not known:
+        raise SetupError(
+            "There are no recordings of hands to play.",
+            "Put some in the folder leap of the folder that HANDSTUDIO_DATA names.",
+        )
     if argument not in known:
         raise SetupError(
             "There is no recording of a hand called {name!r}.",
             "Choose one of: {known}.",
             name=argument,
-            known=", ".join(known) or "(none is at hand)",
+            known=", ".join(known),
         )
     return labelled(replayed(known[argument](), actor), "work")
 
@@ -80,7 +85,8 @@ def replayed(recording: HandRecording, actor: Actor) -> Trajectory:
     low_pass = butter(2, LOW_PASS_HZ, fs=1.0 / _EVERY_S, output="sos")
     smooth = {}
     for name, values in angles.items():
-        sound = np.isfinite(values) & ~_outliers(values)
+        sound = np.isfinite(values)
+        sound[sound] = ~_outliers(values[sound])
         if np.count_nonzero(sound) < 2:
             raise SetupError(
                 "The recording of a hand has nothing of {name}.",
@@ -167,9 +173,8 @@ def _of_palm(q_start_palm: Float[Array, "n 4"]) -> dict[str, Array]:
 
 def _outliers(values: Array) -> Array:
     """What stands out from the median of its neighbours (Hampel's rule)."""
-    known = np.where(np.isfinite(values), values, np.nanmedian(values))
-    middle = median_filter(known, _NEIGHBOURS, mode="nearest")
-    away = np.abs(known - middle)
+    middle = median_filter(values, _NEIGHBOURS, mode="nearest")
+    away = np.abs(values - middle)
     spread = 1.4826 * median_filter(away, _NEIGHBOURS, mode="nearest")
     outliers: Array = away > np.maximum(_STANDS_OUT * spread, _STANDS_OUT_RAD)
     return outliers

@@ -41,8 +41,9 @@ def through_states(
 def through_reversals(time_s: Float[Array, " m"], postures: Float[Array, "m c"]) -> Trajectory:
     """Reach every posture at its instant [s], and turn there as a pendulum does, without a pause.
 
-    Where a channel turns back it does so at the acceleration of a sine; where it has been still,
-    stays or goes on the same way, it comes to rest. So nothing goes further than the postures.
+    Where a channel turns back it does so at the acceleration of a sine; where it goes on the same
+    way it passes at a pace between those of the two sides (the harmonic mean); where it has been
+    still or stays, it rests. So nothing goes further than the postures.
     """
     way, span = np.diff(postures, axis=0), np.diff(time_s)[:, None]
     sine = 0.5 * way * (np.pi / span) ** 2  # acceleration at the begin; minus that at the end
@@ -50,9 +51,12 @@ def through_reversals(time_s: Float[Array, " m"], postures: Float[Array, "m c"])
     least = np.minimum(np.abs(before), np.abs(after))
     # a slow swing before a fast one would bulge if it had to turn as fast as that
     size = np.minimum(0.5 * np.abs(before + after), 1.5 * least)
-    accelerations = np.zeros_like(postures)
+    accelerations, rates = np.zeros_like(postures), np.zeros_like(postures)
     accelerations[1:-1] = np.where(before * after > 0.0, np.sign(after) * size, 0.0)
-    return through_states(time_s, postures, np.zeros_like(postures), accelerations)
+    came, goes = (way / span)[:-1], (way / span)[1:]
+    both = np.where(came * goes > 0.0, came + goes, np.inf)  # infinite: no pace
+    rates[1:-1] = 2.0 * came * goes / both
+    return through_states(time_s, postures, rates, accelerations)
 
 
 def instants(rng: np.random.Generator, mean_s: float, total_s: float) -> Float[Array, " m"]:
