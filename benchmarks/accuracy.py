@@ -201,17 +201,23 @@ def _thesis(people: Sequence[int], strengths: Imperfections) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for setting, published in thesis.PUBLISHED.items():
         ours = {
-            name: np.mean(
+            (name, along): np.mean(
                 [
                     figure
                     for one, figure in zip(asked, figures, strict=True)
-                    if one.setting == setting and one.trial.filter == name
+                    if one.setting == setting
+                    and (one.trial.filter, one.trial.x_along_bone) == (name, along)
                 ],
                 axis=0,
             ).tolist()
             for name in ("raw", "filter1", "vqf")
+            for along in (False, True)
         }
-        found[setting] = {"published": {k: list(v) for k, v in published.items()}, "ours": ours}
+        found[setting] = {
+            "published": {k: list(v) for k, v in published.items()},
+            "x along the flexion axis": {k: v for (k, along), v in ours.items() if not along},
+            "x along the bone": {k: v for (k, along), v in ours.items() if along},
+        }
     return {"sensors": list(thesis.SENSORS), "settings": found}
 
 

@@ -111,8 +111,8 @@ def _show_thesis(experiment: dict[str, Any]) -> None:
     for setting, figures in experiment["settings"].items():
         rows = [
             [f"{name}, {where}", *map(_number, values), _number(float(np.mean(values)))]
-            for where in ("published", "ours")
-            for name, values in figures[where].items()
+            for where, filters in figures.items()
+            for name, values in filters.items()
         ]
         columns = ["filter", *experiment["sensors"], "mean"]
         print_table(f"The thesis's experiment, elbow {setting}: RMSE norm [deg]", columns, rows)
@@ -129,13 +129,14 @@ def _bars(axes: Any, values: dict[str, float], title: str) -> None:
 
 def _draw_thesis(axes: Any, experiment: dict[str, Any]) -> None:
     settings = experiment["settings"]
-    width, at = 0.13, np.arange(len(settings))
-    kinds = [(w, n) for n in ("raw", "filter1") for w in ("published", "ours")]
-    kinds += [("published", "filter4"), ("ours", "vqf")]
+    width, at = 0.095, np.arange(len(settings))
+    published, *ours = next(iter(settings.values()))
+    kinds = [(w, n) for n in ("raw", "filter1") for w in (published, *ours)]
+    kinds += [(published, "filter4"), *((w, "vqf") for w in ours)]
     for k, (where, name) in enumerate(kinds):
         heights = [float(np.mean(one[where][name])) for one in settings.values()]
-        hatch = "" if where == "ours" else "//"
-        axes.bar(at + width * (k - 2.5), heights, width, label=f"{name}, {where}", hatch=hatch)
+        hatch = "//" if where == published else ""
+        axes.bar(at + width * (k - 4), heights, width, label=f"{name}, {where}", hatch=hatch)
     axes.set_xticks(at, list(settings))
     axes.set(title="The thesis's experiment: mean of five sensors", ylabel="RMSE norm [deg]")
     axes.legend(fontsize=8)

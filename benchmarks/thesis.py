@@ -74,10 +74,25 @@ class Asked:
 def takes(
     people: Sequence[int], imperfections: Imperfections, filters: Sequence[str]
 ) -> list[Asked]:
-    """The experiment, on several people where the thesis had one."""
+    """The experiment, on several people where the thesis had one, and with both ways to lay axes.
+
+    Which of a sensor's axes lies along the finger the thesis does not say. It matters to filters on
+    Euler angles: with x along the bone a bent finger turns about y, and comes by their singularity.
+    """
     return [
-        Asked(setting, Trial(person, motion, imperfections, 100 * person + k, filter_name))
+        Asked(
+            setting,
+            Trial(
+                person,
+                motion,
+                imperfections,
+                100 * person + k,
+                filter_name,
+                x_along_bone=along,
+            ),
+        )
         for setting, motions in MOTIONS.items()
+        for along in (False, True)
         for filter_name in filters
         for person in people
         for k, motion in enumerate(motions)

@@ -5,7 +5,7 @@ The pipeline sees events only; the truth is looked at when it is done.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import msgspec
@@ -33,7 +33,7 @@ from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import Imperfections
 from handstudio.simulation.motions.actor import Actor
 from handstudio.simulation.motions.language import perform
-from handstudio.simulation.mounting import segment_indices
+from handstudio.simulation.mounting import nominal_mounting, segment_indices
 from handstudio.simulation.rig import Truth
 from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
@@ -43,6 +43,7 @@ Calibration: TypeAlias = Literal["truth", "nominal"]
 """What the pipeline is told of hand and mounting: all of it, or nothing but the hand's length."""
 
 RATE_HZ = 100
+_X_ALONG_BONE = so3.about_z(0.5 * np.pi)
 _BLOCK = 1000  # instants simulated in one go
 _SETTLED_S = 2.5  # without a heading rotation: the first rest has been found by then
 
@@ -58,6 +59,7 @@ class Trial:
     filter: str = "vqf"
     calibration: Calibration = "truth"
     side: HandSide = "right"
+    x_along_bone: bool = False  # otherwise a sensor's x lies along the flexion axis
 
 
 class Figures(msgspec.Struct, frozen=True):
@@ -113,7 +115,12 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
     someone = subject(trial.person, trial.side)
     if performed is None:
         performed = performance(someone, trial.motion, trial.seed)
-    worn = wear(someone, glove(trial.side), trial.imperfections, trial.seed)
+    nominal = nominal_mounting(glove(trial.side), someone.skeleton)
+    if trial.x_along_bone:
+        nominal = replace(
+            nominal, q_segment_sensor=so3.multiply(nominal.q_segment_sensor, _X_ALONG_BONE)
+        )
+    worn = wear(someone, glove(trial.side), trial.imperfections, trial.seed, nominal=nominal)
     setup = Setup(
         worn.layout,
         float(RATE_HZ),

@@ -34,6 +34,7 @@ from handstudio.simulation.imperfections.strengths import parse
 from handstudio.simulation.motions.actor import Actor
 from handstudio.simulation.motions.language import parse as parsed
 from handstudio.simulation.motions.language import perform
+from handstudio.simulation.motions.naming import resolve
 
 _LONGEST_PAUSE_S = 0.1  # how long an order to stop may go unseen
 _SHORTEST_PAUSE_S = 0.001  # a USB device is asked once a millisecond too
@@ -149,11 +150,12 @@ class Wearer:
         if self._thought is not None and not self._thought.done():
             return Result.BUSY, "still thinking about the last one"
         try:
-            parsed(text)
+            motion = resolve(text)
+            parsed(motion)
         except HandstudioError as error:
             return Result.BAD_ARGUMENT, str(error)
         self._times += 1
-        self._thought = self._thinking.submit(self._perform, text, f"asked {self._times}")
+        self._thought = self._thinking.submit(self._perform, motion, f"asked {self._times}")
         try:
             return Result.OK, f"{self._thought.result(self._AT_ONCE_S):.1f} s"
         except TimeoutError:

@@ -123,18 +123,20 @@ def wear(
     seed: int,
     *,
     world: World | None = None,
+    nominal: Mounting | None = None,
     occasion: int = 0,
 ) -> Worn:
     """Put a glove on: a seed is one glove and one room.
 
     An occasion is one donning and switching on of it: other occasions have other tilts and turn-on
     biases, and the same sensors, skin and room. Strengths scale errors and draw no others.
+    ``nominal`` is how the maker means the sensors to sit, `nominal_mounting` unless given.
 
     Raises:
         LayoutError: a sensor sits on something that is not a segment of the hand.
     """
     on = tuple(segment_indices(layout))
-    nominal = nominal_mounting(layout, subject.skeleton)
+    nominal = nominal_mounting(layout, subject.skeleton) if nominal is None else nominal
     donning = seed + (occasion << 32)
     mounting = donned(nominal, donning, subject.side, imperfections.mounting)
     return Worn(
