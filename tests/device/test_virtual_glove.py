@@ -182,7 +182,7 @@ def test_its_wearer_does_what_the_host_asks(started, connected):
     assert only(Missing, heard) == []
 
 
-@pytest.mark.parametrize("asked", ["juggling", "showcase+", "showcase:twice", "\ud800"])
+@pytest.mark.parametrize("asked", ["juggling", "showcase+juggling", "showcase:twice", "\ud800"])
 def test_what_nobody_can_do_is_refused_with_a_word(started, connected, asked):
     host = connected(started("--pty"))
     request = Request(PERFORM, 3, asked.encode(errors="surrogatepass"))
