@@ -185,8 +185,8 @@ EXERCISES = (
     Motion("resting", "The hand lies, and drifts a little", _resting, "seconds"),
     Motion(
         "elbow_moving",
-        "The elbow swings by ten centimetres; a layer to put over others with &",
+        "The elbow swings by ten centimetres, up, north, west or all; a layer to put over others",
         _elbow_moving,
-        "up, north, west or all; for how many seconds; after how many",
+        "axis seconds after",
     ),
 )
