@@ -7,6 +7,7 @@ import pytest
 
 from handstudio.errors import SetupError
 from handstudio.hand.skeleton import DISTALS, FINGERS, JOINTS, SEGMENTS
+from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.simulation.motions.actor import Actor
 from handstudio.simulation.motions.calibration import CALIBRATION
@@ -17,7 +18,7 @@ from handstudio.simulation.motions.reach import reach
 from handstudio.simulation.motions.trials import JOINT_TRIALS
 from handstudio.simulation.moving import Moving
 from handstudio.simulation.postures import channel_of, channels
-from handstudio.simulation.rig import hand_at
+from handstudio.simulation.rig import hand_at, signals
 from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.world import World
@@ -320,3 +321,39 @@ def test_a_time_that_makes_no_sense_is_refused(text):
 def test_an_elbow_that_cannot_move_so_is_refused(text):
     with pytest.raises(SetupError, match="The elbow cannot move"):
         done(text)
+
+
+@everyone
+@pytest.mark.parametrize(
+    ("sensor", "child", "asked"),
+    [
+        ("SN1", "forearm", ("elbow:flexion", "elbow:rotation")),
+        ("SN11", "hand", ("wrist:flexion", "wrist:deviation")),
+        ("SN15", "index_proximal", ("index_mcp:flexion", "index_mcp:abduction")),
+        ("SN18", "thumb_metacarpal", ("thumb_cmc:flexion", "thumb_cmc:abduction")),
+    ],
+)
+def test_two_trials_of_a_joint_tell_where_it_is(sensor, child, asked, number):
+    """By what a sensor feels of turning about a fixed centre: a = (dw x + w x w x) P."""
+    matrices, felt, where = [], [], []
+    for text in asked:
+        time_us = np.arange(2_000_000, 10_000_000, 10_000)
+        samples, truth = signals(someone(number), glove("right"), done(text, number), time_us)
+        index = glove("right").names.index(sensor)
+        omega, q_sensor_world = samples.gyr[:, index], so3.conjugate(truth.q_world_sensor[:, index])
+        gravity = so3.rotate(q_sensor_world, np.array([0.0, 0.0, AHEAD.gravity_mps2]))
+        turning = crossing(np.gradient(omega, 0.01, axis=0)) + crossing(omega) @ crossing(omega)
+        matrices.append(turning[2:-2].reshape(-1, 3))
+        felt.append((samples.acc[:, index] - gravity)[2:-2].ravel())
+        arm = truth.t_world_sensor[:, index] - truth.t_world_joint[:, SEGMENTS.index(child)]
+        where.append(so3.rotate(q_sensor_world, arm).mean(axis=0))
+    found = np.linalg.lstsq(np.concatenate(matrices), np.concatenate(felt), rcond=None)[0]
+    # two axes of a real joint need not meet, and a finger is not moved alone: some millimetres
+    assert np.linalg.norm(found - np.mean(where, axis=0)) < (0.002 if number == 0 else 0.006)
+
+
+def crossing(vectors: np.ndarray) -> np.ndarray:
+    """Matrices of the cross product from the left."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

@@ -19,18 +19,17 @@ _KEY_MM = 4.0  # how far the wrist travels between keys
 
 
 def _ball_throw(actor: Actor, _: str) -> Trajectory:
-    """Nine throws from the elbow: cocked, whipped forward, let go, and back at ease."""
+    """Nine throws, the elbow on the table: cocked, whipped forward, let go, and back at ease."""
     ease = raised(actor.subject)
     ball = bent(actor.subject, 40.0, 42.0) | thumb(8.0, 35.0, 20.0, 25.0)
     held = ease | ball
-    cocked = held | {"elbow_flexion": 95.0, "wrist_flexion": -40.0, "elbow_rotation": -12.0}
+    cocked = held | {"elbow_flexion": 105.0, "wrist_flexion": -40.0, "elbow_rotation": -12.0}
     # the wrist follows the elbow, and the fingers let go on the way
-    half = held | bent(actor.subject, 28.0, 26.0) | {"elbow_flexion": 64.0, "wrist_flexion": -14.0}
-    half |= {"elbow_up_mm": 20.0}
+    half = held | bent(actor.subject, 28.0, 26.0) | {"elbow_flexion": 74.0, "wrist_flexion": -16.0}
     thrown = ease | bent(actor.subject, 26.0, 24.0) | thumb(-8.0, 20.0, 5.0, 5.0)
-    thrown |= {"elbow_flexion": 24.0, "wrist_flexion": 28.0, "elbow_up_mm": 35.0}
+    thrown |= {"elbow_flexion": 34.0, "wrist_flexion": 26.0}
     through = thrown | bent(actor.subject, 34.0, 28.0)
-    through |= {"elbow_flexion": 17.0, "wrist_flexion": 40.0, "elbow_up_mm": 15.0}
+    through |= {"elbow_flexion": 28.0, "wrist_flexion": 36.0}
     steps: Steps = []
     for _repeat in range(9):
         steps += [(0.7, held), (0.6, cocked), (0.25, cocked)]
@@ -87,7 +86,7 @@ def _key_of(
 
 
 def _tissue(actor: Actor, _: str) -> Trajectory:
-    """Reach for a tissue, pinch, pull it out of the box, crumple it and let it fall."""
+    """Reach for a tissue, pull it out of the box, wipe the table, crumple it and let it fall."""
     ease = raised(actor.subject)
     reaching = ease | bent(actor.subject, 28.0, 30.0) | thumb(2.0, 22.0, 12.0, 8.0, 10.0)
     reaching |= {"elbow_flexion": 22.0, "wrist_flexion": 25.0, "elbow_north_mm": 40.0}
@@ -95,18 +94,20 @@ def _tissue(actor: Actor, _: str) -> Trajectory:
     pinching |= bent(actor.subject, 52.0, 34.0, 3.0, ["middle"])
     pinching |= thumb(17.0, 17.0, 20.0, 8.0, 24.0)
     pulled = pinching | {"elbow_flexion": 62.0, "wrist_flexion": -22.0, "elbow_up_mm": 60.0}
+    # wiping: the hand laid on the tissue, the arm swung to and fro on the table
+    laid = ease | bent(actor.subject, 16.0, 22.0) | thumb(5.0, 18.0, 12.0, 12.0)
+    laid |= {"elbow_flexion": 15.0, "wrist_flexion": -2.0}
+    here = laid | {"elbow_rotation": 16.0, "elbow_north_mm": 25.0, "wrist_deviation_ulnar": 8.0}
+    there = laid | {"elbow_rotation": -16.0, "elbow_north_mm": -15.0, "wrist_deviation_ulnar": -8.0}
     turned = pulled | {"forearm_pronation": -70.0, "wrist_flexion": 0.0}
     loose = turned | bent(actor.subject, 45.0, 55.0) | thumb(10.0, 30.0, 25.0, 25.0, 15.0)
     tight = turned | bent(actor.subject, 78.0, 92.0) | thumb(12.0, 22.0, 42.0, 48.0, 10.0)
     rolled = turned | bent(actor.subject, 62.0, 84.0) | thumb(20.0, 30.0, 30.0, 30.0, 18.0)
     open_ = turned | bent(actor.subject, 5.0, 8.0) | thumb(-10.0, 20.0, 0.0, 0.0)
-    steps: Steps = [
-        (0.9, reaching),
-        (0.4, pinching),
-        (0.2, pinching),
-        (0.35, pulled),
-        (0.6, turned),
-    ]
+    steps: Steps = [(0.9, reaching), (0.4, pinching), (0.2, pinching), (0.35, pulled)]
+    steps += [(0.3, pulled), (0.8, laid)]
+    steps += [step for _ in range(6) for step in ((0.42, here), (0.42, there))]
+    steps += [(0.4, laid), (0.6, turned)]
     for _repeat in range(4):
         steps += [(0.28, loose), (0.3, tight), (0.25, rolled), (0.25, tight)]
     steps += [(0.3, tight), (0.3, open_), (0.4, open_), (1.0, ease)]
@@ -139,6 +140,6 @@ CHORES = (
     Motion("ball_throw", "Nine throws from the elbow, thirty seconds", _ball_throw),
     Motion("pouring", "A bottle is lifted, poured from twice and set down", _pouring),
     Motion("typing", "Bursts of keystrokes", _typing),
-    Motion("tissue", "A tissue is pulled out and crumpled", _tissue),
+    Motion("tissue", "A tissue is pulled out, wiped with and crumpled", _tissue),
     Motion("spinning_top", "A top is spun by thumb and fingers, three times", _spinning_top),
 )

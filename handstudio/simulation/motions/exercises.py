@@ -56,14 +56,17 @@ def _open_close(actor: Actor, _: str) -> Trajectory:
 
 
 def _scissors(actor: Actor, _: str) -> Trajectory:
+    """The hand works a pair of scissors, thumb up: the thumb against middle and ring finger."""
     ease = raised(actor.subject)
-    folded = bent(actor.subject, 75.0, 88.0, fingers=["ring", "little"])
-    ready = ease | bent(actor.subject, 5.0, 5.0, fingers=["index", "middle"])
-    ready |= folded | thumb(12.0, 25.0, 40.0, 50.0)
-    apart = ready | {"index_mcp_abduction": 15.0, "middle_mcp_abduction": -9.0}
-    shut = ready | {"index_mcp_abduction": -2.0, "middle_mcp_abduction": 2.0}
-    cuts: Steps = [step for _ in range(13) for step in ((0.45, apart), (0.4, shut))]
-    steps: Steps = [(1.2, ready), *cuts, (0.4, ready), (1.2, ease)]
+    ready = ease | {"forearm_pronation": -65.0, "wrist_flexion": -12.0, "elbow_flexion": 25.0}
+    ready |= bent(actor.subject, 35.0, 55.0, fingers=["little"])
+    ready |= bent(actor.subject, 25.0, 30.0, fingers=["index"])
+    shut = ready | bent(actor.subject, 40.0, 52.0, fingers=["middle", "ring"])
+    shut |= thumb(12.0, 35.0, 18.0, 22.0)
+    apart = ready | bent(actor.subject, 20.0, 38.0, fingers=["middle", "ring"])
+    apart |= {"index_mcp_flexion": 20.0} | thumb(-12.0, 42.0, 5.0, 6.0)
+    cuts: Steps = [step for _ in range(13) for step in ((0.5, apart), (0.42, shut))]
+    steps: Steps = [(1.2, ready), (0.4, apart), *cuts, (0.4, ready), (1.2, ease)]
     return labelled(acted(actor, "scissors", ease, steps, seconds=15.0), "work")
 
 
@@ -172,7 +175,7 @@ def _to_and_fro(ease: Posture, away: Posture, seconds: float) -> Steps:
 EXERCISES = (
     Motion("joint_by_joint", "One joint after the other, ten seconds", _joint_by_joint),
     Motion("open_close", "Six fists, and wide open between them", _open_close),
-    Motion("scissors", "Index and middle finger cut, fifteen seconds", _scissors),
+    Motion("scissors", "The hand works a pair of scissors, fifteen seconds", _scissors),
     Motion(
         "thesis_index",
         "Still, the arm turned, then elbow, wrist, and the index finger's joints in turn",
@@ -182,8 +185,8 @@ EXERCISES = (
     Motion("resting", "The hand lies, and drifts a little", _resting, "seconds"),
     Motion(
         "elbow_moving",
-        "The elbow swings by ten centimetres; a layer to put over others with &",
+        "The elbow swings by ten centimetres, up, north, west or all; a layer to put over others",
         _elbow_moving,
-        "up, north, west or all; for how many seconds; after how many",
+        "axis seconds after",
     ),
 )

@@ -211,7 +211,7 @@ RECORDED = (
         "recorded",
         "A real hand's motion, recorded elsewhere",
         _recorded,
-        "name of a recording",
+        "name",
         example="pinch",
     ),
 )

@@ -167,11 +167,21 @@ JOINT_TRIALS = (
 )
 """In the order of joints in which a calibration takes them."""
 
+
+def _what(trial: Trial) -> str:
+    joint, _, turn = trial.name.partition(":")
+    first, _, short = joint.partition("_")
+    named = f"{first.capitalize()} {short.upper()}".strip()
+    return f"{named} {_DONE[turn]}, after two seconds of rest"
+
+
+_DONE = {
+    "flexion": "bent and stretched",
+    "abduction": "moved to both sides",
+    "deviation": "moved to both sides",
+    "rotation": "at a right angle, the forearm turned about the upper arm",
+}
+
 TRIALS = tuple(
-    Motion(
-        trial.name,
-        "Two seconds still, then this joint to and fro for eight",
-        partial(perform_trial, trial),
-    )
-    for trial in JOINT_TRIALS
+    Motion(trial.name, _what(trial), partial(perform_trial, trial)) for trial in JOINT_TRIALS
 )
