@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import msgspec
 import pytest
 from hypothesis import given
@@ -94,3 +96,11 @@ def test_every_error_is_explained_once_and_belongs_to_at_most_one_group():
     assert len(set(members)) == len(members)
     assert set(members) <= set(NAMES)
     assert not set(NAMES) & {*GROUPS, *PRESETS}
+
+
+def test_the_table_of_the_documentation_is_this_one():
+    documentation = Path(__file__).resolve().parents[2] / "docs" / "simulation.md"
+    lines = documentation.read_text(encoding="utf-8").splitlines()
+    for one in TABLE:
+        assert f"| `{one.name}` | {one.what} | {one.size} | {one.source} |" in lines
+    assert all(any(f"`{name}`" in line for line in lines) for name in [*GROUPS, *PRESETS])
