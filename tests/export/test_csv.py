@@ -40,7 +40,10 @@ def recorded(tmp_path_factory) -> Take:
     hand = HandModel(hand_length_m=0.175)
     return open_take(
         simulate(
-            folder, rehearse(seed=1, side="left", hand_length_m=hand.hand_length_m), seconds=6.0
+            folder,
+            rehearse(seed=1, side="left", hand_length_m=hand.hand_length_m),
+            seconds=6.0,
+            health=True,
         )
     )
 
