@@ -13,15 +13,13 @@ import numpy as np
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.health.record import TakeHealth
 from handstudio.health.watch import Watch
 from handstudio.layout import glove
 from handstudio.protocol.codec import encode
 from handstudio.protocol.packets import (
     Command,
-    Corruption,
     Description,
-    ImuPacket,
-    Missing,
     Request,
 )
 from handstudio.recording.header import Header, Summary
@@ -45,6 +43,7 @@ from handstudio.stream import EventStream
 
 _STEP_US = 100_000  # of the glove's time in one chunk
 _READ_AHEAD = 1000  # instants
+_LONGEST_OTHER = 300  # bytes: of this glove's frames only those with an instant are longer
 _ROOM = 1 << 24  # bytes: an offline line drops nothing
 
 
@@ -99,6 +98,7 @@ def simulate(
     rate_hz: int = 100,
     code: str = "",
     name: str = "",
+    health: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Path:
     """Write a take, its truth and its labels.
@@ -110,6 +110,8 @@ def simulate(
         rate_hz: Samples a second.
         code: Of the subject; ``virtual-NUMBER`` unless told.
         name: Of the take; as the motion unless told.
+        health: Keep the health of stream and sensors with the take, at half the speed; unless told
+            it is computed when somebody asks for it.
         progress: Told the share that is done.
 
     Raises:
@@ -129,10 +131,12 @@ def simulate(
     start_ns = int(start.timestamp() * 1e9)
     writer = TakeWriter(path, Header(path.stem, code, start_ns, setup, "wire", "simulated"))
     try:
-        heard = _Listener(setup, start_ns)
-        truths = _write(writer, told, rehearsed, seconds, heard=heard, progress=progress)
+        heard = _Listener(setup) if health else None
+        way = _Way(Wire(rehearsed.imperfections, rehearsed.seed))
+        truths = _write(writer, told, rehearsed, seconds, way=way, heard=heard, progress=progress)
         save_truth(path, _truth_file(rehearsed, setup, truths, seconds))
-        writer.close(heard.summary(seconds))
+        counts = way.packets, way.missing, way.damaged
+        writer.close(Summary(0, 0, seconds, *counts, health=heard.health() if heard else None))
     except BaseException:
         writer.discard()  # it can be simulated again
         raise
@@ -155,38 +159,39 @@ def described(subject: Subject, seed: int, rate_hz: int, epoch: int) -> Descript
     )
 
 
-class _Listener:
-    """What a host would have made of the bytes: the summary of the take."""
+class _Way:
+    """The way from device to host: counts what arrives."""
 
-    def __init__(self, setup: Setup, start_ns: int) -> None:
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+        self.packets = self.missing = self.damaged = 0
+
+    def carry(self, frame: bytes) -> bytes:
+        """What arrives of a frame."""
+        arrived = self._wire.carry(frame)
+        if len(frame) > _LONGEST_OTHER:
+            self.packets += arrived == frame
+            self.missing += arrived != frame
+            self.damaged += arrived not in (frame, b"")
+        return arrived
+
+
+class _Listener:
+    """Watches what a host would have watched, for the health of the take."""
+
+    def __init__(self, setup: Setup) -> None:
         self._stream, self._watch = EventStream("handstudio-1", setup.ranges), Watch()
-        self._start_ns = start_ns
-        self._packets = self._missing = self._damaged = 0
         self._watch.begin(setup)
         self._watch.begin_take()
 
-    def hear(self, now_us: int, chunk: bytes) -> int:
-        """Decode what came at this time of the device; returns the host's time [ns]."""
-        arrival_ns = self._start_ns + now_us * 1000
+    def hear(self, arrival_ns: int, chunk: bytes) -> None:
+        """Decode what came."""
         packets, events = self._stream.feed(chunk, arrival_ns)
         self._watch.note(packets, events, arrival_ns)
-        for packet in packets:
-            match packet:
-                case ImuPacket():
-                    self._packets += 1
-                case Missing(count=count):
-                    self._missing += count
-                case Corruption():
-                    self._damaged += 1
-                case _:
-                    pass
-        return arrival_ns
 
-    def summary(self, seconds: float) -> Summary:
-        """Of the whole take; the writer knows its chunks and bytes."""
-        health = self._watch.end_take()
-        found = (self._packets, self._missing, self._damaged)
-        return Summary(0, 0, seconds, *found, health=health)
+    def health(self) -> TakeHealth | None:
+        """Of the whole take."""
+        return self._watch.end_take()
 
 
 def _refuse(seconds: float, rate_hz: int) -> None:
@@ -210,7 +215,8 @@ def _write(
     rehearsed: Rehearsed,
     seconds: float,
     *,
-    heard: _Listener,
+    way: _Way,
+    heard: _Listener | None,
     progress: Callable[[float], None],
 ) -> list[Truth]:
     """Let the glove perform; returns what was true."""
@@ -223,8 +229,8 @@ def _write(
         truths.append(sensed.truth)
         return Readings(sensed.counts, sensed.fresh, sensed.answering, sensed.celsius[-1])
 
-    wire = Wire(rehearsed.imperfections, rehearsed.seed)
-    device = Firmware(told, read, _ROOM, wire=wire.carry, read_ahead=_READ_AHEAD)
+    device = Firmware(told, read, _ROOM, wire=way.carry, read_ahead=_READ_AHEAD)
+    began_ns = writer.start_utc_ns
     device.receive(encode(Request(Command.START, 0)))
     end_us = round(seconds * 1e6)
     for now_us in range(0, end_us + _STEP_US, _STEP_US):
@@ -232,7 +238,10 @@ def _write(
         chunk = device.outgoing
         device.taken(len(chunk))
         if chunk:
-            writer.write(heard.hear(min(now_us, end_us), chunk), chunk)
+            arrival_ns = began_ns + min(now_us, end_us) * 1000
+            writer.write(arrival_ns, chunk)
+            if heard is not None:
+                heard.hear(arrival_ns, chunk)
         progress(min(now_us / end_us, 1.0))
     return truths
 

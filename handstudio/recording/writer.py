@@ -57,6 +57,7 @@ class TakeWriter:
         self.chunks = 0
         self._unfinished = path.with_name(path.name + UNFINISHED)
         self._flushed_at = time.monotonic()
+        self.start_utc_ns = header.start_utc_ns
         self._flushed_until_ns = header.start_utc_ns
         self._stream = self._create()
         try:

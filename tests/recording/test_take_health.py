@@ -17,7 +17,8 @@ from handstudio.recording.writer import TakeWriter
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
-    return open_take(simulate(tmp_path_factory.mktemp("sessions"), rehearse(seed=4), seconds=3.0))
+    sessions = tmp_path_factory.mktemp("sessions")
+    return open_take(simulate(sessions, rehearse(seed=4), seconds=3.0, health=True))
 
 
 def test_a_simulated_take_keeps_its_health(take):
