@@ -140,7 +140,7 @@ def test_a_seed_is_a_glove_on_a_person_in_a_room_to_the_bit(side):
 
 def test_a_seed_keeps_its_numbers():
     """A test or a bug report may rest on a seed: its numbers do not change unnoticed."""
-    assert read(5).counts[100, 7].tolist() == [-80, 2024, 3441, 11, 40, -8, 161, 38, -264]
+    assert read(5).counts[190, 7].tolist() == [-222, -3101, 2704, 13, 36, -11, 116, 291, -7]
 
 
 def test_an_occasion_is_another_donning_of_the_same_glove():
