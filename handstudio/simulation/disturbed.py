@@ -20,7 +20,7 @@ GRADIENT_UT_M = 3.0  # sd of its five free components
 EDGE_PIECES, EDGE_SPACING_M, EDGE_BELOW_M = 9, 0.15, 0.08
 EDGE_AM2 = 0.15  # sd of a piece's remanent moment, each axis
 MAGNET_AM2 = 0.4  # a neodymium disk of 10 mm across and 4 mm high
-MAGNET_AWAY_M = (0.10, 0.20)
+MAGNET_AWAY_M = (0.15, 0.25)  # no finger gets as near as its own breadth
 
 
 def disturbed(world: World, what: Imperfections, seed: int) -> World:

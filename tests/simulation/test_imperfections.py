@@ -349,7 +349,7 @@ def test_the_field_of_a_building_is_one_that_air_can_have():
     [
         (desk_edge, 0.10, 1.0, 60.0),  # the middle of the forearm
         (desk_edge, 0.45, 0.02, 3.0),  # a fingertip
-        (lambda *args: (magnet(*args),), 0.35, 3.0, 60.0),  # the hand
+        (lambda *args: (magnet(*args),), 0.35, 1.5, 30.0),  # the hand
         (lambda *args: (magnet(*args),), 1.35, 0.001, 0.1),  # a metre further
     ],
 )

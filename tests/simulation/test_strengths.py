@@ -80,6 +80,8 @@ def test_strengths_are_kept_and_checked_in_files_too():
     assert msgspec.json.decode(msgspec.json.encode(HARSH), type=Imperfections) == HARSH
     with pytest.raises(SetupError):
         Imperfections(wobble=-0.5)
+    with pytest.raises(SetupError, match="wobble cannot have the strength 99"):
+        msgspec.json.decode(b'{"wobble": 99}', type=Imperfections)
 
 
 def test_presets_are_what_they_are_called():

@@ -140,7 +140,7 @@ def test_a_seed_is_a_glove_on_a_person_in_a_room_to_the_bit(side):
 
 def test_a_seed_keeps_its_numbers():
     """A test or a bug report may rest on a seed: its numbers do not change unnoticed."""
-    assert read(5).counts[100, 7].tolist() == [-80, 2024, 3441, 11, 40, -8, 161, 38, -264]
+    assert read(5).counts[190, 7].tolist() == [-222, -3101, 2704, 13, 36, -11, 116, 291, -7]
 
 
 def test_an_occasion_is_another_donning_of_the_same_glove():
@@ -161,6 +161,21 @@ def test_other_instruments_of_a_motion_may_be_worn_too():
     assert sensed.counts.shape == (1000, 3, 9)
     assert isinstance(state, WornState)
     assert state.index == 1000
+
+
+def test_the_rate_may_change_while_the_glove_is_worn():
+    worn, motion = wear(subject(3), glove(), HARSH, 5), showcase("right")
+    state, true_s = begin(worn), []
+    for first_us, rate_hz in ((5_000_000, 1000), (5_300_000, 50), (5_620_000, 1000)):
+        period_us = 1_000_000 // rate_hz
+        time_us = first_us + np.arange(0, 300_000, period_us)
+        sensed, state = sense(worn, state, motion, time_us, rate_hz)
+        true_s.append(sensed.time_s)
+        rigid = wear(subject(3), glove(), IDEAL, 5)
+        exact, _ = sense(rigid, begin(rigid), motion, time_us, rate_hz)
+        off_m = sensed.truth.t_world_sensor - exact.truth.t_world_sensor
+        assert np.linalg.norm(off_m, axis=-1).max() < 0.05  # nothing swings up
+    assert np.diff(np.concatenate(true_s)).min() > 0.0
 
 
 def test_a_motion_may_be_followed_by_another_while_the_glove_is_worn():

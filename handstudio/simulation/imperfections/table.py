@@ -167,7 +167,7 @@ TABLE = (
     ),
     Source(
         "magnet",
-        "A magnet on the desk, 10 to 20 cm beside the hand",
+        "A magnet on the desk, 15 to 25 cm beside the hand",
         "0.4 A m², a neodymium disk of 10 mm",
         "ours",
     ),
