@@ -242,7 +242,7 @@ def test_every_export_says_where_it_is_from(recorded, motion, tmp_path, content)
     told = json.loads(sidecar(tmp_path))
     header = recorded.header
     assert told["content"] == content
-    assert told["subject"] == "virtual"
+    assert told["subject"] == "virtual-0"
     assert told["hand_side"] == "left"
     assert told["hand_length_m"] == 0.175
     assert list(told["sensor_map"].items()) == [
