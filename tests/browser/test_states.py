@@ -16,7 +16,7 @@ from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .page import begin_recording, button, choose, end_recording, moves_within, scrub_to
+from .page import begin_recording, button, choose, end_recording, field, moves_within, scrub_to
 
 pytestmark = pytest.mark.browser
 
@@ -164,3 +164,20 @@ def write_hinge(folder: Path) -> None:
         '[[joints]]\nname = "hinge"\nparent = "upper"\nchild = "lower"\naxes = 1\n',
         encoding="utf-8",
     )
+
+
+def test_a_virtual_person_does_what_is_asked_and_says_what_not(
+    start_studio: Start, visit: Callable[..., Page]
+) -> None:
+    page = visit(start_studio("--connect", "virtual:?subject=7&motion=rest:600"))
+    expect(page.get_by_text("Live · Virtual glove on person 7")).to_be_visible()
+    page.get_by_role("tab", name="Device").click()
+    asked = field(page, "or described")
+    asked.fill("juggling")
+    asked.press("Tab")
+    button(page, "Do this now").click()
+    expect(page.get_by_text("There is no motion 'juggling'")).to_be_visible()
+    asked.fill("Index MP flexion")
+    asked.press("Tab")
+    button(page, "Do this now").click()
+    assert moves_within(page, 15.0)
