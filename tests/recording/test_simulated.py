@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
-from handstudio.hand.angles import hand_angles
+from handstudio.errors import TakeError
+from handstudio.hand.angles import hand_angles, joint_angles
+from handstudio.hand.pose import posed
 from handstudio.maths import so3
 from handstudio.process import process
+from handstudio.recording.notes import load_notes
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
-from handstudio.recording.truth import load_truth
+from handstudio.recording.truth import load_truth, truth_path
 from handstudio.setup import HandModel
+from handstudio.simulation.imperfections.strengths import parse
 
 
 @pytest.mark.parametrize(("side", "rate_hz"), [("right", 100), ("left", 200)])
@@ -46,3 +52,44 @@ def test_a_seed_is_one_glove(tmp_path):
 
     assert recorded(1) == recorded(1)
     assert recorded(1) != recorded(2)
+
+
+def test_labels_and_losses_of_a_person_at_work_stand_beside_the_take(tmp_path):
+    worn = rehearse(7, "quick_start+open_close", parse("typical,lost_packets=4"), 3)
+    path = simulate(tmp_path, worn)
+    take, truth = open_take(path), load_truth(path)
+    assert path.parent.parent == tmp_path / "virtual-7"
+    assert take.header.setup.hand.hand_length_m == worn.subject.hand_length_m
+    labels = [label.label for label in load_notes(path).labels]
+    assert labels == ["static", "heading_rotation", "static", "work"]
+    summary = take.summary
+    assert summary.missing > 0
+    assert summary.packets + summary.missing == len(truth.time_us)
+    np.testing.assert_array_equal(truth.q_segment_sensor, worn.worn.mounting.q_segment_sensor)
+    facts = json.loads(truth.facts)
+    assert (facts["person"], facts["seed"], facts["motion"]) == (7, 3, "quick_start+open_close")
+    assert parse(facts["imperfections"]) == parse("typical,lost_packets=4")
+    heard = process(take)
+    assert set(heard.time_us) < set(truth.time_us)
+
+
+def test_the_truth_of_an_instant_is_single_but_close(tmp_path):
+    worn = rehearse(7, "showcase", seed=3)
+    path = simulate(tmp_path, worn, seconds=8.0)
+    truth = load_truth(path)
+    start = np.broadcast_to(truth.q_world_start, (len(truth.time_us), 4))
+    skeleton = worn.subject.skeleton
+    angles = joint_angles(skeleton, truth.q_world_segment.astype(float), start)
+    np.testing.assert_allclose(truth.angles, angles, atol=2e-6)
+    tips = posed(skeleton, truth.q_world_segment.astype(float)).t_world_tip
+    assert np.linalg.norm(tips - truth.t_world_tip, axis=-1).max() < 0.006  # joints roll
+
+
+def test_a_file_that_holds_no_truth_is_told(tmp_path):
+    path = simulate(tmp_path, seconds=0.2)
+    truth_path(path).write_bytes(b"PK\x03\x04 broken")
+    with pytest.raises(TakeError, match="truth of a take"):
+        load_truth(path)
+    truth_path(path).unlink()
+    with pytest.raises(TakeError, match="truth of a take"):
+        load_truth(path)
