@@ -180,6 +180,7 @@ def test_the_library_is_kept_tidy(
     assert not [path for path in sessions.rglob("*") if "S07" in path.name]
 
 
+@pytest.mark.long
 def test_two_pages_control_one_studio_and_are_told(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
@@ -195,6 +196,7 @@ def test_two_pages_control_one_studio_and_are_told(
     expect(one.get_by_text("2 pages are open")).not_to_be_visible()
 
 
+@pytest.mark.long
 def test_the_browsers_language_is_spoken_and_another_can_be_chosen(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:

@@ -106,6 +106,7 @@ def test_an_interrupted_recording_can_be_had_back(
     expect(page.get_by_text("Replay · broken-recovered")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_recording_without_a_hand_is_shown_and_says_what_is_missing(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:
@@ -119,6 +120,7 @@ def test_a_recording_without_a_hand_is_shown_and_says_what_is_missing(
     expect(page.get_by_text("Turn across the joint")).to_be_visible()
 
 
+@pytest.mark.long
 def test_on_a_narrow_page_the_plots_start_put_away(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
