@@ -55,12 +55,11 @@ def settled(sloped: Sloped, start: Float[Array, "n x"], tries: int = 40) -> Floa
     """
     x = start.copy()
     r, slopes = sloped(x)
-    cost, damping = np.sum(r**2, axis=1), np.full(len(x), 1e-6)
+    cost, damping = np.sum(r**2, axis=1), np.full(len(x), 1e-3)
     for _ in range(tries):
         turned = np.swapaxes(slopes, 1, 2)
         normal, gradient = turned @ slopes, (turned @ r[..., None])[..., 0]
-        scale = np.einsum("nii->ni", normal)
-        damped = normal + (damping[:, None] * scale)[:, :, None] * np.eye(x.shape[1])
+        damped = normal + damping[:, None, None] * np.eye(x.shape[1])
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         r_new, slopes_new = sloped(x + step)
         cost_new = np.sum(r_new**2, axis=1)

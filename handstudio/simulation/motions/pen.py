@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 
 from handstudio.arrays import Array
 from handstudio.hand.angles import joint_index
@@ -20,6 +20,7 @@ from handstudio.simulation.placing import Placed, Placer, limits, outwards, plac
 from handstudio.simulation.postures import channels
 from handstudio.simulation.solving import solved
 from handstudio.simulation.subject import Subject
+from handstudio.simulation.trajectory import Trajectory
 
 HOLDING = ("thumb_distal", "index_distal", "middle_distal")
 TOUCHING_M = 0.0002
@@ -117,35 +118,70 @@ class HeldPen:
     length_m: float
     desk_m: float
 
+    def pose(
+        self, q_world_segment: Float[Array, "n k 4"], t_world_joint: Float[Array, "n k 3"]
+    ) -> tuple[Float[Array, "n 4"], Float[Array, "n 3"]]:
+        """Attitude of the pen and place of its tip in the world [m].
 
-def pen_pose(
-    pen: HeldPen, q_world_segment: Float[Array, "n k 4"], t_world_joint: Float[Array, "n k 3"]
-) -> tuple[Float[Array, "n 4"], Float[Array, "n 3"]]:
-    """Attitude of the pen and place of its tip [m], from where the segments are.
+        The rigid placement nearest to the three points of skin, in the sense of least squares
+        (W. Kabsch, Acta Cryst. A 32 (1976) 922).
+        """
+        pads = self.skin(q_world_segment, t_world_joint)
+        middle, own = pads.mean(axis=1), self.contacts.mean(axis=0)
+        spread = np.swapaxes(pads - middle[:, None], 1, 2) @ (self.contacts - own)
+        u, _, vt = np.linalg.svd(spread)
+        u[:, :, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[:, None]
+        attitude = u @ vt
+        return so3.from_matrix(attitude), middle - attitude @ own
 
-    The rigid placement nearest to the three points of skin, in the sense of least squares
-    (W. Kabsch, Acta Cryst. A 32 (1976) 922).
+    def skin(
+        self, q_world_segment: Float[Array, "n k 4"], t_world_joint: Float[Array, "n k 3"]
+    ) -> Float[Array, "n 3 3"]:
+        """Places in the world of the three points of skin that hold it [m]."""
+        holding = [SEGMENTS.index(name) for name in HOLDING]
+        turned = so3.rotate(q_world_segment[:, holding], self.pads)
+        return t_world_joint[:, holding] + turned
+
+    def writes(self, t_world_pen: Float[Array, "n 3"]) -> Bool[Array, " n"]:
+        """Whether a tip there touches the paper; False where it is unknown (NaN)."""
+        down: Array = t_world_pen[:, 2] - self.desk_m < TOUCHING_M
+        return down
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PenTruth:
+    """Where a pen truly was.
+
+    Attributes:
+        q_world_pen: Attitude, z along the pen to its end; NaN while none is held.
+        t_world_pen: Place of its tip [m]; NaN while none is held.
+        pen_down: Whether it wrote.
     """
-    holding = [SEGMENTS.index(name) for name in HOLDING]
-    pads = t_world_joint[:, holding] + so3.rotate(q_world_segment[:, holding], pen.pads)
-    middle, own = pads.mean(axis=1), pen.contacts.mean(axis=0)
-    u, _, vt = np.linalg.svd(np.swapaxes(pads - middle[:, None], 1, 2) @ (pen.contacts - own))
-    u[:, :, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[:, None]
-    attitude = u @ vt
-    return so3.from_matrix(attitude), middle - attitude @ own
+
+    q_world_pen: Float[Array, "n 4"]
+    t_world_pen: Float[Array, "n 3"]
+    pen_down: Bool[Array, " n"]
 
 
-def pen_tip(
-    pen: HeldPen, q_world_segment: Float[Array, "n k 4"], t_world_joint: Float[Array, "n k 3"]
-) -> Float[Array, "n 3"]:
-    """Place of the pen's tip in the world [m], from where the segments are."""
-    return pen_pose(pen, q_world_segment, t_world_joint)[1]
-
-
-def pen_down(pen: HeldPen, t_world_pen: Float[Array, "n 3"]) -> Bool[Array, " n"]:
-    """Whether a tip there writes; False where it is unknown (NaN)."""
-    down: Array = t_world_pen[:, 2] - pen.desk_m < TOUCHING_M
-    return down
+def pen_truth(
+    trajectory: Trajectory,
+    time_us: Int64[Array, " n"],
+    q_world_segment: Float[Array, "n k 4"],
+    t_world_joint: Float[Array, "n k 3"],
+) -> PenTruth | None:
+    """Where the pens of a motion are, from its true segments; None where nobody writes."""
+    time_s = time_us * 1e-6 - trajectory.begins_s
+    time_s = np.mod(time_s, trajectory.duration_s) if trajectory.periodic else time_s
+    q, t = np.full((len(time_us), 4), np.nan), np.full((len(time_us), 3), np.nan)
+    down, pens = np.zeros(len(time_us), dtype=bool), 0
+    for span in trajectory.spans:
+        if not isinstance(span.held, HeldPen):
+            continue
+        pens += 1
+        now = (span.start_s <= time_s) & (time_s <= span.end_s)
+        q[now], t[now] = span.held.pose(q_world_segment[now], t_world_joint[now])
+        down[now] = span.held.writes(t[now])
+    return PenTruth(q, t, down) if pens else None
 
 
 @lru_cache(maxsize=16)
