@@ -70,6 +70,6 @@ def settled(sloped: Sloped, start: Float[Array, "n x"], tries: int = 40) -> Floa
         slopes = np.where(better[:, None, None], slopes_new, slopes)
         cost = np.where(better, cost_new, cost)
         damping = np.where(better, 0.1 * damping, 10.0 * damping).clip(1e-12, 1e6)
-        if np.abs(step).max() < 1e-10:
+        if np.abs(step).max() < 1e-8:
             break
     return x

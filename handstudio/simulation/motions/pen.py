@@ -41,17 +41,17 @@ _HABIT = {
     "forearm_pronation": -38.0,
     "wrist_flexion": -26.0,
     "wrist_deviation_ulnar": -2.0,
-    "thumb_cmc_flexion": 14.0,
-    "thumb_cmc_abduction": 22.0,
-    "thumb_cmc_rotation": 12.0,
-    "thumb_mcp_flexion": 26.0,
-    "thumb_ip_flexion": 19.0,
-    "index_mcp_flexion": 56.0,
-    "index_pip_flexion": 42.0,
-    "index_dip_flexion": 7.0,
-    "middle_mcp_flexion": 56.0,
-    "middle_pip_flexion": 49.0,
-    "middle_dip_flexion": 19.0,
+    "thumb_cmc_flexion": 8.0,
+    "thumb_cmc_abduction": 28.0,
+    "thumb_cmc_rotation": 8.0,
+    "thumb_mcp_flexion": 28.0,
+    "thumb_ip_flexion": 40.0,
+    "index_mcp_flexion": 48.0,
+    "index_pip_flexion": 60.0,
+    "index_dip_flexion": 20.0,
+    "middle_mcp_flexion": 50.0,
+    "middle_pip_flexion": 65.0,
+    "middle_dip_flexion": 28.0,
     "ring_mcp_flexion": 60.0,
     "ring_pip_flexion": 80.0,
     "ring_dip_flexion": 45.0,
@@ -190,7 +190,9 @@ def held_pen(subject: Subject) -> HeldPen:
     place, active = placer(subject), _channels(WRITING_JOINTS + _CURLED)
     habit = channels(_HABIT, subject.side)
     desk_m = -float(subject.half_depth_m[0])  # the elbow rests on it
-    least, most = (np.concatenate([x[active], w]) for x, w in zip(limits(subject), _FREE))
+    least, most = (x[active] for x in limits(subject))
+    spare = np.minimum(_SPARE, 0.25 * (most - least))
+    least, most = np.append(least + spare, [-np.inf] * 6), np.append(most - spare, [np.inf] * 6)
     found: Array | None = None
     for exact_m in (1e-3, 1e-4, 2e-5):  # demanding all at once leads astray, or takes long
         grip = _Grip(place, active, habit, desk_m, exact_m)
@@ -198,7 +200,7 @@ def held_pen(subject: Subject) -> HeldPen:
     return grip.held(found)
 
 
-_FREE = (np.full(6, -np.inf), np.full(6, np.inf))
+_SPARE = np.deg2rad(8.0)  # what a grip leaves of a range of motion, to write with
 
 
 @dataclass(frozen=True, slots=True, eq=False)
