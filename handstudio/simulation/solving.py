@@ -14,8 +14,8 @@ from handstudio.arrays import Array
 Residuals: TypeAlias = Callable[[Array], Array]
 """Unknowns (n, x) to residuals (n, r), in units of what each may be off."""
 
-Sloped: TypeAlias = Callable[[Array], tuple[Array, Array]]
-"""Unknowns (n, x) to residuals (n, r) and their slopes (n, r, x)."""
+Sloped: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
+"""Unknowns (n, x) of some rows, and which, to residuals (n, r) and their slopes (n, r, x)."""
 
 _STEP = 1e-6
 
@@ -47,29 +47,46 @@ def solved(
     return best
 
 
-def settled(sloped: Sloped, start: Float[Array, "n x"], tries: int = 40) -> Float[Array, "n x"]:
+def settled(
+    sloped: Sloped, start: Float[Array, "n x"], within: float = 1e-8, tries: int = 60
+) -> Float[Array, "n x"]:
     """Each row where its own residuals are smallest: Levenberg's and Marquardt's way, all at once.
 
     What a row ends in depends on its own residuals only, and smoothly, as long as they have one
-    minimum near the start.
+    minimum near the start. Damping as in H. B. Nielsen, IMM-REP-1999-05, Technical University of
+    Denmark.
+
+    Args:
+        sloped: The residuals.
+        start: Unknowns to start from.
+        within: A row is done as soon as no unknown would go farther than this.
+        tries: Steps at most.
     """
+    out, rows = start.copy(), np.arange(len(start))
     x = start.copy()
-    r, slopes = sloped(x)
-    cost, damping = np.sum(r**2, axis=1), np.full(len(x), 1e-3)
+    r, slopes = sloped(x, rows)
+    damping, growth = np.ones(len(x)), np.full(len(x), 2.0)
     for _ in range(tries):
         turned = np.swapaxes(slopes, 1, 2)
-        normal, gradient = turned @ slopes, (turned @ r[..., None])[..., 0]
-        damped = normal + damping[:, None, None] * np.eye(x.shape[1])
+        gradient = (turned @ r[..., None])[..., 0]
+        damped = turned @ slopes + damping[:, None, None] * np.eye(x.shape[1])
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
-        r_new, slopes_new = sloped(x + step)
-        cost_new = np.sum(r_new**2, axis=1)
-        # at the end rounding alone decides; a step that is no step is taken
-        better = cost_new <= cost * (1.0 + 1e-12)
+        r_new, slopes_new = sloped(x + step, rows)
+        cost, cost_new = np.sum(r**2, axis=1), np.sum(r_new**2, axis=1)
+        expected = np.sum(step * (damping[:, None] * step - gradient), axis=1)
+        gain = (cost - cost_new) / np.maximum(expected, 1e-300)
+        better = cost_new <= cost * (1.0 + 1e-12)  # at the end rounding alone decides
         x = np.where(better[:, None], x + step, x)
+        out[rows] = x
         r = np.where(better[:, None], r_new, r)
         slopes = np.where(better[:, None, None], slopes_new, slopes)
-        cost = np.where(better, cost_new, cost)
-        damping = np.where(better, 0.1 * damping, 10.0 * damping).clip(1e-12, 1e6)
-        if np.abs(step).max() < 1e-8:
+        easier = np.maximum(1.0 / 3.0, 1.0 - (2.0 * np.clip(gain, 0.0, 1.0) - 1.0) ** 3)
+        damping = (damping * np.where(better, easier, growth)).clip(1e-9, 1e9)
+        growth = np.where(better, 2.0, 2.0 * growth).clip(2.0, 64.0)
+        on = np.abs(step).max(axis=1) > within
+        if not on.any():
             break
-    return x
+        rows, x, r, slopes, damping, growth = (
+            part[on] for part in (rows, x, r, slopes, damping, growth)
+        )
+    return out

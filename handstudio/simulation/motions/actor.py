@@ -16,7 +16,7 @@ from handstudio.simulation.subject import Subject
 from handstudio.simulation.trajectory import Trajectory, joined
 from handstudio.simulation.world import World
 
-Stroke: TypeAlias = Float[Array, "m 2"]
+Stroke: TypeAlias = Float[Array, "_ 2"]
 """What a pen draws without being lifted: right and up, in heights of a character."""
 
 

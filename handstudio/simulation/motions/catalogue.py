@@ -10,6 +10,7 @@ from handstudio.simulation.motions.chores import CHORES
 from handstudio.simulation.motions.exercises import EXERCISES
 from handstudio.simulation.motions.recorded import RECORDED
 from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.motions.writing import WRITING
 from handstudio.simulation.trajectory import Trajectory
 
 
@@ -24,6 +25,7 @@ FAMILIES = (
     CALIBRATION,
     EXERCISES,
     CHORES,
+    WRITING,
     RECORDED,
 )
 

@@ -7,7 +7,7 @@ smooth function of the tip's place, and writing the same again is moving the sam
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +17,7 @@ from handstudio.hand.angles import DEVIATION, joint_index
 from handstudio.hand.skeleton import FINGERS, SEGMENTS
 from handstudio.maths import so3
 from handstudio.simulation.motions.pen import HOLDING, WRITING_JOINTS, HeldPen, writing_channels
-from handstudio.simulation.placing import Placed, Placer, placer
+from handstudio.simulation.placing import Placed, Placer, limits, placer
 from handstudio.simulation.solving import settled
 from handstudio.simulation.subject import Subject
 
@@ -25,18 +25,22 @@ from handstudio.simulation.subject import Subject
 # rotation: the forearm rests, so mostly fingers and wrist. Ours.
 _READY_DEG = {
     "elbow": (0.3, 1.2, 2.0),
-    "wrist": (5.0, 5.0),
+    "wrist": (8.0, 6.0),
     "thumb_cmc": (6.0, 6.0, 4.0),
     "thumb_mcp": (8.0, 3.0),
     "thumb_ip": (8.0,),
     **{f"{finger}_mcp": (8.0, 4.0) for finger in FINGERS[1:]},
     **{f"{finger}_{joint}": (8.0,) for finger in FINGERS[1:] for joint in ("pip", "dip")},
 }
-_PEN_TILTS_DEG = 8.0
+_PEN_TILTS_DEG = 15.0
 _COUPLED_DEG = 3.0  # how far a last joint strays from what the one before makes it do
 _GLIDES_M = 0.0005  # and the hand's outer side from the height it rests at
+_NEAR_RAD, _STRAIN = np.deg2rad(6.0), 4.0  # from the end of a range of motion; there, against habits
 _GLIDING = ("little_intermediate", "little_distal")
-_EXACT_M = 2e-5  # against habits this is as good as exact: what remains is under a micrometre
+# Ever more exactly: at once takes long. Against habits the last is exact: what remains is under a
+# micrometre.
+_EXACT_M = (1e-3, 1e-4, 2e-5)
+_NEARLY, _WITHIN = 1e-3, 1e-7  # rad
 
 
 def following(
@@ -51,8 +55,11 @@ def following(
         swing: Where the forearm would like to be: about the vertical, from the habit [rad].
     """
     task = _task(placer(subject), pen, tip, swing)
-    start = np.concatenate([task.habit[:, task.active], np.zeros((len(tip), 3))], axis=1)
-    return task.postures(settled(task.sloped, start))
+    found = task.usual()
+    for exact_m in _EXACT_M:
+        task = replace(task, exact_m=exact_m)
+        found = settled(task.sloped, found, _WITHIN if exact_m == _EXACT_M[-1] else _NEARLY)
+    return task.postures(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +74,8 @@ class _Task:
     arms: Float[Array, "n 3 3"]  # from the tip to the skin that holds it, habitually
     resting: Float[Array, " p"]  # heights of what glides
     leaning: Float[Array, "r x"]  # what habit makes of departures from it
+    limits: tuple[Float[Array, " a"], Float[Array, " a"]]
+    exact_m: float = _EXACT_M[0]
 
     def postures(self, x: Array) -> Array:
         """Unknowns as postures."""
@@ -74,12 +83,22 @@ class _Task:
         out[:, self.active] = x[:, : len(self.active)]
         return out
 
-    def sloped(self, x: Array) -> tuple[Array, Array]:
-        """Residuals in units of what each may be off, and their slopes."""
+    def sloped(self, x: Array, rows: Array) -> tuple[Array, Array]:
+        """Residuals in units of what each may be off, and their slopes, of some instants."""
+        some = replace(self, habit=self.habit[rows], tip=self.tip[rows], arms=self.arms[rows])
+        return some.weighed(x)
+
+    def weighed(self, x: Array) -> tuple[Array, Array]:
+        """The same, of all instants."""
         placed, tilt = self.place.placed(self.postures(x)), x[:, len(self.active) :]
         away = x - self.usual()
         habit = np.broadcast_to(self.leaning, (len(x), *self.leaning.shape))
-        parts = [self.touching(placed, tilt), self.gliding(placed), (away @ self.leaning.T, habit)]
+        parts = [
+            self.touching(placed, tilt),
+            self.gliding(placed),
+            self.straining(x),
+            (away @ self.leaning.T, habit),
+        ]
         return (
             np.concatenate([residuals for residuals, _ in parts], axis=1),
             np.concatenate([slopes for _, slopes in parts], axis=1),
@@ -103,7 +122,7 @@ class _Task:
             axis=-1,
         )
         n = len(tilt)
-        return apart.reshape(n, 9) / _EXACT_M, slopes.reshape(n, 9, -1) / _EXACT_M
+        return apart.reshape(n, 9) / self.exact_m, slopes.reshape(n, 9, -1) / self.exact_m
 
     def gliding(self, placed: Placed) -> tuple[Array, Array]:
         """How far the hand's outer side has left the desk."""
@@ -113,6 +132,16 @@ class _Task:
         slopes = np.concatenate([moved, np.zeros((*moved.shape[:2], 3))], axis=-1)
         return (points[..., 2] - self.resting) / _GLIDES_M, slopes / _GLIDES_M
 
+    def straining(self, x: Array) -> tuple[Array, Array]:
+        """How near joints are to the ends of their range; smooth where it sets in."""
+        c = len(self.active)
+        least, most = self.limits
+        above = np.maximum(x[:, :c] - (most - _NEAR_RAD), 0.0) / _NEAR_RAD
+        below = np.minimum(x[:, :c] - (least + _NEAR_RAD), 0.0) / _NEAR_RAD
+        slopes = np.zeros((len(x), c, c + 3))
+        np.einsum("nii->ni", slopes[..., :c])[:] = 2.0 * _STRAIN * (above + below) / _NEAR_RAD
+        return _STRAIN * (above**2 + below**2), slopes
+
 
 def _task(place: Placer, pen: HeldPen, tip: Array, swing: Array) -> _Task:
     active = writing_channels()
@@ -120,7 +149,10 @@ def _task(place: Placer, pen: HeldPen, tip: Array, swing: Array) -> _Task:
     habit[:, DEVIATION] += swing
     arms = so3.rotate(so3.about_z(swing)[:, None], pen.contacts @ pen.attitude.T)
     resting = place.placed(pen.posture[None]).points(*_gliding(place.subject))[0, :, 2]
-    return _Task(place, pen, active, habit, tip, arms, resting, _leaning(place.subject, active))
+    leaning = _leaning(place.subject, active)
+    least, most = limits(place.subject)
+    ends = (least[active], most[active])
+    return _Task(place, pen, active, habit, tip, arms, resting, leaning, ends)
 
 
 def _gliding(subject: Subject) -> tuple[list[int], Array]:

@@ -106,6 +106,7 @@ class _Leg:
     swing: tuple[float, float]
     elbow: tuple[Array, Array]
     character: int
+    stroke: int
 
 
 def _planned(actor: Actor, pen: HeldPen, characters: list[Character]) -> PenWay:
@@ -176,10 +177,11 @@ def _written(text: _Reached, pen: HeldPen, rng: np.random.Generator) -> Iterator
         size, shift = rng.normal(1.0, _SIZE_SD), rng.normal(0.0, _PLACE_SD_M, 2)
         place = np.array([HEIGHT_M * character.middle - text.middle_m, 0.0]) + shift
         swing = _turn(pen, place[0])
-        for stroke in character.strokes:
+        for which, stroke in enumerate(character.strokes):
             points = place + size * HEIGHT_M * (stroke - middle)
             for run in drawn(points, np.exp(rng.normal(0.0, _HURRY_SD))):
-                yield _Leg(run, _ON_PAPER, (swing, swing), (text.elbow, text.elbow), number)
+                staying = (swing, swing), (text.elbow, text.elbow)
+                yield _Leg(run, _ON_PAPER, *staying, number, which)
 
 
 def _connected(strokes: list[_Leg], rng: np.random.Generator) -> Iterator[_Leg]:
@@ -190,10 +192,10 @@ def _connected(strokes: list[_Leg], rng: np.random.Generator) -> Iterator[_Leg]:
         yield before
         if after is None:
             break
+        if (before.character, before.stroke) == (after.character, after.stroke):
+            continue  # a corner
         here, there = _end(before, 1.0), _end(after, 0.0)
         moved = not np.array_equal(before.elbow[1], after.elbow[0])
-        if not moved and np.array_equal(here, there):
-            continue  # a corner
         run = over(here, there, np.exp(rng.normal(0.0, _HURRY_SD)), _ELBOW_MOVES_S if moved else 0.0)
         yield _Leg(
             run,
@@ -201,13 +203,14 @@ def _connected(strokes: list[_Leg], rng: np.random.Generator) -> Iterator[_Leg]:
             (before.swing[1], after.swing[0]),
             (before.elbow[1], after.elbow[0]),
             before.character,
+            before.stroke,
         )
     yield replace(strokes[-1], run=_still(end), height=(0.0, 0.0, _LIFT_M))
 
 
 def _end(leg: _Leg, u: float) -> Array:
     place: Array = leg.run.at(np.array([u * leg.run.seconds]))[0]
-    return np.round(place, 9)
+    return place
 
 
 def _still(place: Array) -> Run:
