@@ -17,7 +17,7 @@ Residuals: TypeAlias = Callable[[Array], Array]
 Sloped: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """Unknowns (n, x) of some rows, and which, to residuals (n, r) and their slopes (n, r, x)."""
 
-_STEP = 1e-6
+_STEP = 1e-7
 
 
 def solved(
@@ -25,23 +25,25 @@ def solved(
     start: Float[Array, " x"],
     least: Float[Array, " x"],
     most: Float[Array, " x"],
+    within: float = 1e-8,
     tries: int = 80,
 ) -> Float[Array, " x"]:
-    """Unknowns within limits whose residuals are smallest, from a start nearby."""
+    """Unknowns within limits whose residuals are smallest, from a start nearby.
+
+    Done as soon as a step would make them smaller by no more than this share.
+    """
 
     def one(x: Array) -> Array:
         return residuals(x[None])[0]
 
     def slope(x: Array) -> Array:
-        steps = _STEP * np.eye(len(x))
-        both = residuals(np.concatenate([x + steps, x - steps]))
-        ahead, behind = np.split(both, 2)
-        change: Array = ((ahead - behind) / (2.0 * _STEP)).T
+        ahead = residuals(np.concatenate([x[None], x + _STEP * np.eye(len(x))]))
+        change: Array = ((ahead[1:] - ahead[0]) / _STEP).T
         return change
 
     inside = np.clip(start, least + 1e-9, most - 1e-9)
     found = least_squares(
-        one, inside, slope, bounds=(least, most), x_scale=1.0, max_nfev=tries, xtol=1e-9, ftol=1e-9
+        one, inside, slope, bounds=(least, most), x_scale=1.0, max_nfev=tries, xtol=1e-9, ftol=within
     )
     best: Array = np.asarray(found.x)
     return best
