@@ -43,7 +43,9 @@ class Placed:
     turning: Float[Array, "n d 3"]
     sliding: Float[Array, "n d 3"]
 
-    def points(self, segments: list[int], offsets: Float[Array, "p 3"]) -> Float[Array, "n p 3"]:
+    def points(
+        self, segments: list[int], offsets: Float[Array, "*#m p 3"]
+    ) -> Float[Array, "n p 3"]:
         """Points fixed in segments."""
         turned: Array = (self.attitude[:, segments] @ offsets[..., None])[..., 0]
         return self.place[:, segments] + turned

@@ -7,7 +7,6 @@ from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares
 
 from handstudio.arrays import Array
 
@@ -18,6 +17,7 @@ Sloped: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """Unknowns (n, x) of some rows, and which, to residuals (n, r) and their slopes (n, r, x)."""
 
 _STEP = 1e-7
+_STUCK = 1e12
 
 
 def solved(
@@ -30,23 +30,43 @@ def solved(
 ) -> Float[Array, " x"]:
     """Unknowns within limits whose residuals are smallest, from a start nearby.
 
-    Done as soon as a step would make them smaller by no more than this share.
+    Levenberg's and Marquardt's way; what stands at a limit and would go beyond stays. Done as soon
+    as a step makes the sum of squares smaller by no more than this share. (scipy's is as good, but
+    its singular values take ten times as long where every core is busy.)
     """
+    x = np.clip(start, least, most)
+    r, slopes = _sloped(residuals, x)
+    damping, growth = 1.0, 2.0
+    for _ in range(tries):
+        gradient = slopes.T @ r
+        free = ~(((x <= least) & (gradient > 0.0)) | ((x >= most) & (gradient < 0.0)))
+        normal = slopes[:, free].T @ slopes[:, free]
+        step = np.zeros_like(x)
+        step[free] = -np.linalg.solve(normal + damping * np.eye(len(normal)), gradient[free])
+        there = np.clip(x + step, least, most)
+        step, r_there = there - x, residuals(there[None])[0]
+        gained = float(r @ r - r_there @ r_there)
+        foreseen = -float(2.0 * gradient @ step + np.sum((slopes @ step) ** 2))
+        if gained < 0.0:
+            damping, growth = damping * growth, 2.0 * growth
+            if damping > _STUCK:
+                break
+            continue
+        x, done = there, gained <= within * float(r @ r)
+        if done:
+            break
+        r, slopes = _sloped(residuals, x)
+        ease = 2.0 * min(1.0, gained / max(foreseen, 1e-300)) - 1.0
+        damping, growth = max(1e-9, damping * max(1.0 / 3.0, 1.0 - ease**3)), 2.0
+    return x
 
-    def one(x: Array) -> Array:
-        return residuals(x[None])[0]
 
-    def slope(x: Array) -> Array:
-        ahead = residuals(np.concatenate([x[None], x + _STEP * np.eye(len(x))]))
-        change: Array = ((ahead[1:] - ahead[0]) / _STEP).T
-        return change
-
-    inside = np.clip(start, least + 1e-9, most - 1e-9)
-    found = least_squares(
-        one, inside, slope, bounds=(least, most), x_scale=1.0, max_nfev=tries, xtol=1e-9, ftol=within
-    )
-    best: Array = np.asarray(found.x)
-    return best
+def _sloped(residuals: Residuals, x: Array) -> tuple[Array, Array]:
+    """Residuals and their slopes, without those that are nothing and stay so."""
+    at = residuals(np.concatenate([x[None], x + _STEP * np.eye(len(x))]))
+    slopes = ((at[1:] - at[0]) / _STEP).T
+    some = (at[0] != 0.0) | slopes.any(axis=1)
+    return at[0, some], slopes[some]
 
 
 def settled(

@@ -85,6 +85,12 @@ def _pads(*fingers: str) -> tuple[Contact, ...]:
     return tuple(Contact(f"{name}_distal", _TIP) for name in fingers)
 
 
+def _around() -> tuple[Contact, ...]:
+    """Five pads about something round: the outer ones with their inner sides."""
+    sides = {"thumb": 0.0, "index": -35.0, "middle": -10.0, "ring": 10.0, "little": 35.0}
+    return tuple(Contact(f"{name}_distal", _TIP, side) for name, side in sides.items())
+
+
 def _wrapped(*phalanges: str) -> tuple[Contact, ...]:
     return tuple(Contact(f"{name}_{part}") for name in FINGERS[1:] for part in phalanges)
 
@@ -122,8 +128,8 @@ GRASPS = (
         "Small Diameter",
         _bar,
         (30.0, 25.0, 40.0),
-        (Contact(PALM), *_wrapped("intermediate", "distal"), *_pads("thumb")),
-        _curled(70.0, 75.0) | thumb(15.0, 35.0, 30.0, 40.0, 8.0),
+        (Contact(PALM), *_wrapped("intermediate", "distal")),
+        _curled(70.0, 75.0) | thumb(3.0, 16.0, 46.0, 55.0),
         _ACROSS,
         place=(0.0, 0.42, 0.5),
     ),
@@ -201,7 +207,7 @@ GRASPS = (
         "Power Disk",
         _disk,
         (90.0, 75.0, 100.0),
-        (Contact(PALM), *_pads(*_ALL)),
+        (Contact(PALM), *_around()),
         _curled(35.0, 45.0, 10.0) | thumb(-5.0, 35.0, 10.0, 30.0, 5.0),
         (0.0, 0.0, 1.0),
         place=(-0.03, 0.50, 0.11),
@@ -211,7 +217,7 @@ GRASPS = (
         "Power Sphere",
         _ball,
         (75.0, 55.0, 90.0),
-        (Contact(PALM), *_pads(*_ALL), *(Contact(f"{f}_intermediate") for f in FINGERS[1:4])),
+        (Contact(PALM), *_around(), Contact("middle_intermediate"), Contact("ring_intermediate")),
         _curled(35.0, 50.0, 10.0) | thumb(0.0, 50.0, 10.0, 20.0, 8.0),
         (0.0, 0.0, 1.0),
         place=(0.0, 0.47, 0.5),
@@ -221,7 +227,7 @@ GRASPS = (
         "Precision Disk",
         _disk,
         (80.0, 55.0, 95.0),
-        _pads(*_ALL),
+        _around(),
         _curled(40.0, 40.0, 10.0) | thumb(-5.0, 40.0, 5.0, 15.0, 5.0),
         (0.0, 0.0, 1.0),
     ),
@@ -230,7 +236,7 @@ GRASPS = (
         "Precision Sphere",
         _ball,
         (60.0, 40.0, 80.0),
-        _pads(*_ALL),
+        _around(),
         _curled(45.0, 40.0, 6.0) | thumb(0.0, 45.0, 8.0, 18.0, 8.0),
         (0.0, 0.0, 1.0),
     ),

@@ -31,10 +31,11 @@ YIELDS_M = 0.0015
 """Flesh gives way this much at most."""
 
 _EXACT_M = ((2e-3, 1e-4), (2e-4, 1e-4), (2e-5, 1e-6))  # and by which share a step must better it
-_ATTEMPTS = 6  # from other starts
-_MEANT_DEPTH_M, _DEPTH_M = 0.0007, 0.0001
+_ATTEMPTS = 4  # from other starts
+_MEANT_DEPTH_M, _DEPTH_M = 0.0007, 0.0002
 _FINGERS_APART_M = 0.0030  # less than both their half depths: they are soft, and oval
-_FACING = 0.5
+_SLIDES = 0.25  # of a phalanx, either way from where skin is meant to touch
+_FACING = 0.4
 _HABIT_DEG, _COUPLED_DEG = 14.0, 6.0
 _PLACE_M, _TILT_DEG = 0.010, 12.0
 
@@ -80,13 +81,14 @@ def grasped(
         SetupError: this hand cannot.
     """
     least, most = (x[_active()] for x in limits(subject))
-    least, most = np.append(least, [-np.inf] * 6), np.append(most, [np.inf] * 6)
+    slides, free = np.full(len(kind.contacts), _SLIDES), np.full(6, np.inf)
+    least, most = np.concatenate([least, -slides, -free]), np.concatenate([most, slides, free])
     for _ in range(_ATTEMPTS):
         search = _search(subject, kind, kind.shape(size_m), size_m, rng)
         found = search.start()
         for exact_m, within in _EXACT_M:
             search = replace(search, exact_m=exact_m)
-            found = solved(search.residuals, found, least, most, within, tries=40)
+            found = solved(search.residuals, found, least, most, within, tries=50)
         gap, depth = search.judged(found)
         if gap < TOUCHING_M and depth < YIELDS_M:
             return search.grasp(found)
@@ -100,8 +102,20 @@ def grasped(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Skin:
+    """Skin that touches: segments, points of it, ways out of it, and along the whole segment."""
+
+    segments: list[int]
+    points: Float[Array, "p 3"]
+    out: Float[Array, "p 3"]
+    along: Float[Array, "p 3"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """Unknown are turns, and how the thing is turned and shifted from where it is meant."""
+    """Unknown are turns, where along its phalanx skin touches, and how the thing is turned and
+    shifted from where it is meant.
+    """
 
     place: Placer
     kind: GraspClass
@@ -110,7 +124,7 @@ class _Search:
     habit: Float[Array, " c"]
     attitude: Float[Array, "3 3"]  # of the thing in the hand, as it is meant
     middle: Float[Array, "3"]
-    skin: tuple[list[int], Float[Array, "p 3"], Float[Array, "p 3"]]  # that touches; out of it
+    skin: _Skin
     flesh: tuple[list[int], Float[Array, "b 3"], Float[Array, " b"]]  # bones and half depths
     apart: Float[Array, "b b"]  # of bones of different digits
     coupling: Float[Array, "4 x"]
@@ -118,12 +132,12 @@ class _Search:
 
     def start(self) -> Array:
         """Habit."""
-        return np.append(self.habit[self.active], np.zeros(6))
+        return np.append(self.habit[self.active], np.zeros(len(self.skin.segments) + 6))
 
     def postures(self, x: Array) -> Array:
         """Unknowns as postures."""
         out = np.tile(self.habit, (len(x), 1))
-        out[:, self.active] = x[:, :-6]
+        out[:, self.active] = x[:, : len(self.active)]
         return out
 
     def seen(self, x: Array, placed: Placed, points: Array) -> Array:
@@ -137,11 +151,11 @@ class _Search:
     def residuals(self, x: Array) -> Array:
         """In units of what each may be off."""
         placed = self.place.placed(self.postures(x))
-        segments, offsets, out = self.skin
-        at = placed.points(segments, offsets)
+        segments, c = self.skin.segments, len(self.active)
+        at = placed.points(segments, self.touching(x))
         gap = self.shape.distance(self.seen(x, placed, at))
         # skin that faces the thing comes as much nearer as it goes out
-        ahead = at + 0.002 * placed.directions(segments, out)
+        ahead = at + 0.002 * placed.directions(segments, self.skin.out)
         facing = (gap - self.shape.distance(self.seen(x, placed, ahead))) / 0.002 - 1.0
         bones, depth = self.buried(x, placed)
         between = np.linalg.norm(bones[:, :, None] - bones[:, None], axis=-1)
@@ -152,12 +166,19 @@ class _Search:
             facing / _FACING,
             np.maximum(depth - _MEANT_DEPTH_M, 0.0) / max(_DEPTH_M, 0.2 * self.exact_m),
             close / 0.001,
-            away[:, :-6] / np.deg2rad(_HABIT_DEG),
+            away[:, :c] / np.deg2rad(_HABIT_DEG),
+            away[:, c:-6] / _SLIDES,
             away[:, -6:-3] / np.deg2rad(_TILT_DEG),
             away[:, -3:] / _PLACE_M,
             away @ self.coupling.T,
         ]
         return np.concatenate(parts, axis=1)
+
+    def touching(self, x: Array) -> Array:
+        """Points of skin that touch, in their segments' frames."""
+        slid = x[:, len(self.active) : -6, None] * self.skin.along
+        points: Array = self.skin.points + slid
+        return points
 
     def buried(self, x: Array, placed: Placed) -> tuple[Array, Array]:
         """Points of bones, and how deep the thing is in the flesh around them [m]."""
@@ -168,7 +189,7 @@ class _Search:
     def judged(self, x: Array) -> tuple[float, float]:
         """How far the skin is from the surface, and how deep the thing in the flesh [m]."""
         placed = self.place.placed(self.postures(x[None]))
-        gap = self.shape.distance(self.seen(x[None], placed, placed.points(*self.skin[:2])))
+        gap = self.shape.distance(self.seen(x[None], placed, placed.points(self.skin.segments, self.touching(x[None]))))
         return float(np.abs(gap).max()), float(self.buried(x[None], placed)[1].max())
 
     def grasp(self, x: Array) -> Grasp:
@@ -177,7 +198,7 @@ class _Search:
         held = HeldObject(
             self.kind.name, self.shape, so3.from_matrix(turned), self.middle + x[-3:]
         )
-        return Grasp(self.kind, self.postures(x[None])[0], held, self.skin[:2])
+        return Grasp(self.kind, self.postures(x[None])[0], held, (self.skin.segments, self.touching(x[None])[0]))
 
 
 def _active() -> list[int]:
@@ -196,14 +217,13 @@ def _search(
     middle = _middle(place, kind, habit, size_m, touching) + 0.002 * rng.standard_normal(3)
     attitude = _attitude(kind, subject.side == "left")
     attitude = so3.to_matrix(so3.exp(np.deg2rad(3.0) * rng.standard_normal(3))) @ attitude
-    apart, coupling = _apart(flesh), _coupling(subject, active)
+    apart, coupling = _apart(flesh), _coupling(subject, active, len(kind.contacts) + 6)
     return _Search(
         place, kind, shape, active, habit, attitude, middle, touching, flesh, apart, coupling
     )
 
 
-def _touching(subject: Subject, kind: GraspClass) -> tuple[list[int], Array, Array]:
-    """Segments, points of their skin, and the ways out of it."""
+def _touching(subject: Subject, kind: GraspClass) -> _Skin:
     segments, points, out = list[int](), list[Array](), list[Array]()
     for contact in kind.contacts:
         palm = contact.segment == PALM
@@ -214,7 +234,8 @@ def _touching(subject: Subject, kind: GraspClass) -> tuple[list[int], Array, Arr
             else skin(subject, contact.segment, contact.along, contact.towards_deg)
         )
         out.append(outwards(subject, contact.towards_deg))
-    return segments, np.array(points), np.array(out)
+    far = subject.skeleton.t_far_end[segments]
+    return _Skin(segments, np.array(points), np.array(out), far)
 
 
 def _palm(subject: Subject) -> Array:
@@ -266,9 +287,9 @@ def _digit(segment: str) -> int:
     return FINGERS.index(name) if name in FINGERS else -1
 
 
-def _coupling(subject: Subject, active: list[int]) -> Array:
+def _coupling(subject: Subject, active: list[int], others: int) -> Array:
     """What last joints do by themselves is taken for strain."""
-    rows = np.zeros((4, len(active) + 6))
+    rows = np.zeros((4, len(active) + others))
     for row, finger, ratio in zip(rows, FINGERS[1:], subject.dip_per_pip, strict=True):
         row[active.index(3 * joint_index(f"{finger}_dip"))] = 1.0
         row[active.index(3 * joint_index(f"{finger}_pip"))] = -ratio
@@ -280,14 +301,14 @@ def _middle(
     kind: GraspClass,
     habit: Array,
     size_m: float,
-    touching: tuple[list[int], Array, Array],
+    touching: _Skin,
 ) -> Array:
     """Of the thing, in the hand, where it is meant to be."""
     subject = place.subject
     placed = place.placed(habit[None])
     mirror = np.array([1.0 if subject.side == "right" else -1.0, 1.0, 1.0])
     if kind.place is None:  # between thumb and fingers
-        skin_now = placed.points(*touching[:2])[0]
+        skin_now = placed.points(touching.segments, touching.points)[0]
         hand = SEGMENTS.index("hand")
         thumb, others = skin_now[:1], skin_now[1:]
         between = 0.5 * (thumb.mean(axis=0) + others.mean(axis=0))
