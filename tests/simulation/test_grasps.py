@@ -56,7 +56,11 @@ def check(name: str, number: int, side: str, argument: str | None = None, seed: 
     depth = half - distance(index, bones)
     assert depth.max() < 0.0020  # looked at more closely than the search does: 1.5 mm there
     used = {SEGMENTS[i].split("_")[0] for i in touching[0]}
-    near = {SEGMENTS[i].split("_")[0] for i, d in zip(index, depth.max(axis=0), strict=True) if d > -0.001}
+    near = {
+        SEGMENTS[i].split("_")[0]
+        for i, d in zip(index, depth.max(axis=0), strict=True)
+        if d > -0.001
+    }
     assert used & set(FINGERS) <= near  # the bone is half the thickness away
     least, most = limits(someone)
     posture = trajectory.posture(np.linspace(0.0, trajectory.duration_s, 200))

@@ -35,7 +35,10 @@ _READY_DEG = {
 _PEN_TILTS_DEG = 15.0
 _COUPLED_DEG = 3.0  # how far a last joint strays from what the one before makes it do
 _GLIDES_M = 0.0005  # and the hand's outer side from the height it rests at
-_NEAR_RAD, _STRAIN = np.deg2rad(6.0), 4.0  # from the end of a range of motion; there, against habits
+_NEAR_RAD, _STRAIN = (
+    np.deg2rad(6.0),
+    4.0,
+)  # from the end of a range of motion; there, against habits
 _GLIDING = ("little_intermediate", "little_distal")
 # Ever more exactly: at once takes long. Against habits the last is exact: what remains is under a
 # micrometre.

@@ -44,7 +44,11 @@ _JOINTS = (
     ("thumb_cmc", 3),
     ("thumb_mcp", 2),
     ("thumb_ip", 1),
-    *((f"{f}_{joint}", n) for f in FINGERS[1:] for joint, n in (("mcp", 2), ("pip", 1), ("dip", 1))),
+    *(
+        (f"{f}_{joint}", n)
+        for f in FINGERS[1:]
+        for joint, n in (("mcp", 2), ("pip", 1), ("dip", 1))
+    ),
 )
 _PHALANGES = tuple(
     f"{finger}_{part}"
@@ -72,9 +76,7 @@ class Grasp:
     contacts: tuple[list[int], Float[Array, "p 3"]]
 
 
-def grasped(
-    subject: Subject, kind: GraspClass, size_m: float, rng: np.random.Generator
-) -> Grasp:
+def grasped(subject: Subject, kind: GraspClass, size_m: float, rng: np.random.Generator) -> Grasp:
     """How this person holds a thing of this size, never twice quite the same.
 
     Raises:
@@ -189,16 +191,21 @@ class _Search:
     def judged(self, x: Array) -> tuple[float, float]:
         """How far the skin is from the surface, and how deep the thing in the flesh [m]."""
         placed = self.place.placed(self.postures(x[None]))
-        gap = self.shape.distance(self.seen(x[None], placed, placed.points(self.skin.segments, self.touching(x[None]))))
+        gap = self.shape.distance(
+            self.seen(x[None], placed, placed.points(self.skin.segments, self.touching(x[None])))
+        )
         return float(np.abs(gap).max()), float(self.buried(x[None], placed)[1].max())
 
     def grasp(self, x: Array) -> Grasp:
         """What was found."""
         turned = so3.to_matrix(so3.exp(x[-6:-3])) @ self.attitude
-        held = HeldObject(
-            self.kind.name, self.shape, so3.from_matrix(turned), self.middle + x[-3:]
+        held = HeldObject(self.kind.name, self.shape, so3.from_matrix(turned), self.middle + x[-3:])
+        return Grasp(
+            self.kind,
+            self.postures(x[None])[0],
+            held,
+            (self.skin.segments, self.touching(x[None])[0]),
         )
-        return Grasp(self.kind, self.postures(x[None])[0], held, (self.skin.segments, self.touching(x[None])[0]))
 
 
 def _active() -> list[int]:

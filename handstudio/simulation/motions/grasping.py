@@ -100,7 +100,11 @@ def held_in_hand(grasp: Grasp, actor: Actor) -> Trajectory:
     """From the flat hand to a grasp and back."""
     side, flat = actor.subject.side, np.zeros_like(grasp.posture)
     reach, lift = (channels(posture, side) for posture in (_REACH, _LIFT))
-    opened, closed, lifted = reach + _opened(grasp.posture), reach + grasp.posture, lift + grasp.posture
+    opened, closed, lifted = (
+        reach + _opened(grasp.posture),
+        reach + grasp.posture,
+        lift + grasp.posture,
+    )
     stops = [flat, opened, closed, closed, lifted, lifted, closed, closed, opened, flat]
     time_s = np.round(np.cumsum([0.0, *_SECONDS]), 6)
     span = Span(_CLOSED, _OPENED, f"grasp:{grasp.kind.name}", grasp.held)

@@ -74,9 +74,7 @@ def laid_out(text: str, strokes: Callable[[str], Sequence[Stroke]]) -> list[Char
         out.append(Character(name, at, at + width, placed))
         at += width + (_LATIN_GAP if name.isascii() else _GAP)
     if not out:
-        raise SetupError(
-            "There is nothing to write.", "Say what: writing:同志社大, for example."
-        )
+        raise SetupError("There is nothing to write.", "Say what: writing:同志社大, for example.")
     return out
 
 
@@ -110,7 +108,9 @@ def over(
     """From one stroke's end to the next one's start, in this time or more."""
     way = float(np.linalg.norm(end - start))
     seconds = _whole(max(least_s, _LIFTING_S + _duration(way)) / hurry)
-    return Run(seconds, lambda time_s: start + minimum_jerk(time_s / seconds)[:, None] * (end - start))
+    return Run(
+        seconds, lambda time_s: start + minimum_jerk(time_s / seconds)[:, None] * (end - start)
+    )
 
 
 def minimum_jerk(u: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -142,13 +142,17 @@ def _between_corners(points: Array) -> list[tuple[int, int]]:
     reach = max(1, round(_CORNER_M / step))
     if len(points) <= 2 * reach + 1:
         return [(0, len(points) - 1)]
-    before, after = points[reach:-reach] - points[: -2 * reach], points[2 * reach :] - points[reach:-reach]
+    before, after = (
+        points[reach:-reach] - points[: -2 * reach],
+        points[2 * reach :] - points[reach:-reach],
+    )
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     turn = np.abs(np.arctan2(across, np.sum(before * after, axis=-1)))
     corners = [
         i + reach
         for i in range(len(turn))
-        if turn[i] > _CORNER_RAD and turn[i] == turn[max(0, i - 2 * reach) : i + 2 * reach + 1].max()
+        if turn[i] > _CORNER_RAD
+        and turn[i] == turn[max(0, i - 2 * reach) : i + 2 * reach + 1].max()
     ]
     # of a corner with two equal sides only the first point is one
     corners = [c for i, c in enumerate(corners) if i == 0 or c - corners[i - 1] > 2 * reach]
@@ -163,7 +167,9 @@ def _piece(points: Array, hurry: float) -> Run:
     place = make_interp_spline(along, smooth, k=min(5, len(points) - 1))
     seconds = _whole(_duration(float(along[-1])) / hurry)
     # "as if it were longer where it is bent": minimum jerk runs along this length
-    bent = np.linalg.norm(np.atleast_2d(place(along, 2)), axis=-1) if len(points) > 3 else 0.0 * along
+    bent = (
+        np.linalg.norm(np.atleast_2d(place(along, 2)), axis=-1) if len(points) > 3 else 0.0 * along
+    )
     slower = gaussian_filter1d((1.0 + bent * _STRAIGHT_M) ** (1.0 / 3.0), 3.0, mode="nearest")
     felt = np.concatenate([[0.0], np.cumsum(0.5 * (slower[1:] + slower[:-1]) * steps)])
     real = make_interp_spline(felt, along, k=3)

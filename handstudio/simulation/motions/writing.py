@@ -196,7 +196,9 @@ def _connected(strokes: list[_Leg], rng: np.random.Generator) -> Iterator[_Leg]:
             continue  # a corner
         here, there = _end(before, 1.0), _end(after, 0.0)
         moved = not np.array_equal(before.elbow[1], after.elbow[0])
-        run = over(here, there, np.exp(rng.normal(0.0, _HURRY_SD)), _ELBOW_MOVES_S if moved else 0.0)
+        run = over(
+            here, there, np.exp(rng.normal(0.0, _HURRY_SD)), _ELBOW_MOVES_S if moved else 0.0
+        )
         yield _Leg(
             run,
             (0.0, float(rng.normal(_LIFT_M, _LIFT_SD_M)), 0.0),
