@@ -30,7 +30,8 @@ class Sphere:
 
     def distance(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
         """From points in its frame to its surface [m]: negative inside."""
-        return np.linalg.norm(points, axis=-1) - self.radius_m
+        distance: Array = np.linalg.norm(points, axis=-1) - self.radius_m
+        return distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,8 @@ class Box:
 def _cornered(beyond: Float[Array, "*n d"]) -> Float[Array, "*n"]:
     """Distance to what is square: by how much a point is beyond each of its faces."""
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
-    return outside + np.minimum(beyond.max(axis=-1), 0.0)
+    distance: Array = outside + np.minimum(beyond.max(axis=-1), 0.0)
+    return distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,6 +25,7 @@ def solved(
     start: Float[Array, " x"],
     least: Float[Array, " x"],
     most: Float[Array, " x"],
+    *,
     within: float = 1e-8,
     tries: int = 80,
 ) -> Float[Array, " x"]:

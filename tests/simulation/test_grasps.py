@@ -87,8 +87,7 @@ def test_the_hand_is_open_before_and_after_and_holds_for_a_while():
     assert held.name == "tripod"
     np.testing.assert_array_equal(trajectory.start, 0.0)
     np.testing.assert_allclose(trajectory.end, 0.0, atol=1e-12)
-    fingers = [i for i in range(9, 54)]
-    inside = trajectory.posture(np.linspace(start_s, end_s, 50))[:, fingers]
+    inside = trajectory.posture(np.linspace(start_s, end_s, 50))[:, 9:54]
     np.testing.assert_allclose(inside, np.tile(inside[0], (50, 1)), atol=1e-12)
 
 

@@ -1,5 +1,7 @@
 """What a pen writes, from the true segments alone, against what was to be written."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -52,7 +54,7 @@ def on_paper(truth: PenTruth, world: World) -> np.ndarray:
 
 def asked(text: str) -> np.ndarray:
     """The strokes as one cloud [m], in squares side by side."""
-    strokes = [s + [1.1 * i, 0.0] for i, c in enumerate(text) for s in kanji_strokes(c)]
+    strokes = [s + np.array([1.1 * i, 0.0]) for i, c in enumerate(text) for s in kanji_strokes(c)]
     return HEIGHT_M * np.concatenate(strokes)
 
 
@@ -138,7 +140,7 @@ def test_four_characters_take_no_other_place_of_the_elbow(four):
 def test_characters_are_named_in_their_order(four):
     spans = four[0].spans
     assert [span.name for span in spans] == [*"同志社大", "writing:同志社大"]
-    assert all(a.end_s <= b.start_s for a, b in zip(spans[:3], spans[1:4], strict=True))
+    assert all(a.end_s <= b.start_s for a, b in pairwise(spans[:4]))
 
 
 def test_a_left_hand_writes_the_same_text():

@@ -192,4 +192,5 @@ def _turned_by(rotation: Array) -> Array:
     safe = np.where(near, 1.0, angle)
     first = np.where(near, 0.5, (1.0 - np.cos(safe)) / safe**2)
     second = np.where(near, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
-    return np.eye(3) + first * k + second * (k @ k)
+    turned: Array = np.eye(3) + first * k + second * (k @ k)
+    return turned

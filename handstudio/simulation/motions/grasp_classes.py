@@ -102,7 +102,7 @@ def _curled(mcp: float, pip: float, spread: float = 0.0) -> dict[str, float]:
 
 def _precise(*used: str) -> dict[str, float]:
     """These fingertips opposite the thumb, the others out of the way."""
-    posture = {}
+    posture = dict[str, float]()
     for name in FINGERS[1:]:
         posture |= finger(name, 52.0, 35.0) if name in used else finger(name, 35.0, 70.0)
     return posture | thumb(flexion=8.0, abduction=42.0, mcp=12.0, ip=18.0, rotation=8.0)

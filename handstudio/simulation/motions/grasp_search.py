@@ -31,7 +31,7 @@ YIELDS_M = 0.0015
 """Flesh gives way this much at most."""
 
 _EXACT_M = ((2e-3, 1e-4), (2e-4, 1e-4), (2e-5, 1e-6))  # and by which share a step must better it
-_ATTEMPTS = 4  # from other starts
+_ATTEMPTS = 8  # from other starts
 _MEANT_DEPTH_M, _DEPTH_M = 0.0007, 0.0002
 _FINGERS_APART_M = 0.0030  # less than both their half depths: they are soft, and oval
 _SLIDES = 0.25  # of a phalanx, either way from where skin is meant to touch
@@ -90,7 +90,7 @@ def grasped(subject: Subject, kind: GraspClass, size_m: float, rng: np.random.Ge
         found = search.start()
         for exact_m, within in _EXACT_M:
             search = replace(search, exact_m=exact_m)
-            found = solved(search.residuals, found, least, most, within, tries=50)
+            found = solved(search.residuals, found, least, most, within=within, tries=50)
         gap, depth = search.judged(found)
         if gap < TOUCHING_M and depth < YIELDS_M:
             return search.grasp(found)
@@ -300,7 +300,8 @@ def _coupling(subject: Subject, active: list[int], others: int) -> Array:
     for row, finger, ratio in zip(rows, FINGERS[1:], subject.dip_per_pip, strict=True):
         row[active.index(3 * joint_index(f"{finger}_dip"))] = 1.0
         row[active.index(3 * joint_index(f"{finger}_pip"))] = -ratio
-    return rows / np.deg2rad(_COUPLED_DEG)
+    coupling: Array = rows / np.deg2rad(_COUPLED_DEG)
+    return coupling
 
 
 def _middle(
@@ -320,10 +321,13 @@ def _middle(
         thumb, others = skin_now[:1], skin_now[1:]
         between = 0.5 * (thumb.mean(axis=0) + others.mean(axis=0))
         middle: Array = (between - placed.place[0, hand]) @ placed.attitude[0, hand]
-        return middle + np.multiply(kind.shift_m, mirror)
+        middle += np.multiply(kind.shift_m, mirror)
+        return middle
     x, y, depth = kind.place
     below = subject.half_depth_m[SEGMENTS.index("hand")] + depth * size_m
-    return mirror * np.array([x * subject.hand_length_m, y * subject.hand_length_m, -below])
+    length = subject.hand_length_m
+    meant: Array = mirror * np.array([x * length, y * length, -below])
+    return meant
 
 
 def _attitude(kind: GraspClass, left: bool) -> Array:

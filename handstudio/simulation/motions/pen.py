@@ -6,7 +6,7 @@ rigid body its place follows from theirs alone, and whoever knows the true segme
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -193,13 +193,16 @@ def held_pen(subject: Subject) -> HeldPen:
     least, most = (x[active] for x in limits(subject))
     spare = np.minimum(_SPARE, 0.25 * (most - least))
     least, most = np.append(least + spare, [-np.inf] * 6), np.append(most - spare, [np.inf] * 6)
-    found: Array | None = None
-    for exact_m in (1e-3, 1e-4, 2e-5):  # demanding all at once leads astray, or takes long
-        grip = _Grip(place, active, habit, desk_m, exact_m)
-        found = solved(grip.residuals, grip.start() if found is None else found, least, most)
+    grip = _Grip(place, active, habit, desk_m)
+    found = grip.start()
+    for exact_m in _EXACT_M:
+        grip = replace(grip, exact_m=exact_m)
+        found = solved(grip.residuals, found, least, most)
     return grip.held(found)
 
 
+# How exactly skin and pen meet: demanding all at once leads astray, or takes long.
+_EXACT_M = (1e-3, 1e-4, 2e-5)
 _SPARE = np.deg2rad(8.0)  # what a grip leaves of a range of motion, to write with
 
 
@@ -211,7 +214,7 @@ class _Grip:
     active: list[int]
     habit: Array
     desk_m: float
-    exact_m: float
+    exact_m: float = _EXACT_M[0]
 
     @property
     def side(self) -> HandSide:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -70,7 +71,7 @@ def laid_out(text: str, strokes: Callable[[str], Sequence[Stroke]]) -> list[Char
         if name.isascii():
             x = np.concatenate(drawn)[:, 0]
             left, width = float(x.min()), float(np.ptp(x))
-        placed = [stroke + [at - left, 0.0] for stroke in drawn]
+        placed = [stroke + np.array([at - left, 0.0]) for stroke in drawn]
         out.append(Character(name, at, at + width, placed))
         at += width + (_LATIN_GAP if name.isascii() else _GAP)
     if not out:
@@ -120,7 +121,7 @@ def minimum_jerk(u: Float[Array, " n"]) -> Float[Array, " n"]:
 
 
 def _duration(length_m: float) -> float:
-    return max(_LEAST_S, _TAKES_S * (length_m / _LENGTH_M) ** _ISOCHRONY)
+    return max(_LEAST_S, float(_TAKES_S * (length_m / _LENGTH_M) ** _ISOCHRONY))
 
 
 def _whole(seconds: float) -> float:
@@ -157,7 +158,7 @@ def _between_corners(points: Array) -> list[tuple[int, int]]:
     # of a corner with two equal sides only the first point is one
     corners = [c for i, c in enumerate(corners) if i == 0 or c - corners[i - 1] > 2 * reach]
     ends = [0, *corners, len(points) - 1]
-    return list(zip(ends[:-1], ends[1:], strict=True))
+    return list(pairwise(ends))
 
 
 def _piece(points: Array, hurry: float) -> Run:

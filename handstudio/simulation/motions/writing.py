@@ -125,7 +125,8 @@ def _planned(actor: Actor, pen: HeldPen, characters: list[Character]) -> PenWay:
             spans[leg.character] = (first, began + leg.run.seconds)
         began += leg.run.seconds
     named = (Span(*ends, characters[i].name) for i, ends in spans.items())
-    return PenWay(*(np.concatenate(part) for part in zip(*parts, strict=True)), tuple(named))
+    time_s, tip, swing, elbow, down = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return PenWay(time_s, tip, swing, elbow, down, tuple(named))
 
 
 _ON_PAPER = (0.0, 0.0, 0.0)
@@ -156,8 +157,8 @@ def _reached(characters: list[Character]) -> list[_Reached]:
     """A text in what the arm reaches without moving on, and the elbow's places."""
     groups = list[list[tuple[int, Character]]]()
     for numbered in enumerate(characters):
-        wide = groups and (numbered[1].right - groups[-1][0][1].left) * HEIGHT_M
-        if not groups or wide > _REACH_M:
+        left = groups[-1][0][1].left if groups else -np.inf
+        if (numbered[1].right - left) * HEIGHT_M > _REACH_M:
             groups.append([])
         groups[-1].append(numbered)
     middles = [0.5 * HEIGHT_M * (g[0][1].left + g[-1][1].right) for g in groups]
