@@ -206,11 +206,11 @@ GRASPS = (
         "power_disk",
         "Power Disk",
         _disk,
-        (90.0, 75.0, 100.0),
+        (82.0, 70.0, 95.0),
         (Contact(PALM), *_around()),
         _curled(35.0, 45.0, 10.0) | thumb(-5.0, 35.0, 10.0, 30.0, 5.0),
         (0.0, 0.0, 1.0),
-        place=(-0.03, 0.50, 0.11),
+        place=(-0.02, 0.47, 0.12),
     ),
     GraspClass(
         "power_sphere",

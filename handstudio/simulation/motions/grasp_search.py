@@ -31,7 +31,7 @@ YIELDS_M = 0.0015
 """Flesh gives way this much at most."""
 
 _EXACT_M = ((2e-3, 1e-4), (2e-4, 1e-4), (2e-5, 1e-6))  # and by which share a step must better it
-_ATTEMPTS = 8  # from other starts
+_ATTEMPTS = 5  # from other starts
 _MEANT_DEPTH_M, _DEPTH_M = 0.0007, 0.0002
 _FINGERS_APART_M = 0.0030  # less than both their half depths: they are soft, and oval
 _SLIDES = 0.25  # of a phalanx, either way from where skin is meant to touch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +34,8 @@ def grasp(actor: Actor, argument: str) -> Trajectory:
 
     Args:
         actor: Who grasps.
-        argument: A class, or ``class/size`` [mm].
+        argument: A class, or ``class/size`` [mm]. Without a size it is the usual one, or a little
+            less or more where that does not fit the hand.
 
     Raises:
         SetupError: there is no such class, or not for this size or hand.
@@ -72,9 +74,18 @@ def grasp_of(actor: Actor, argument: str) -> Grasp:
             name=name,
             known=", ".join(_BY_NAME),
         )
-    kind = _BY_NAME[name]
-    size_m = 1e-3 * (_size_mm(kind, size) if size else kind.size_mm[0])
-    return grasped(actor.subject, kind, size_m, actor.rng(f"grasp {name}"))
+    kind, rng = _BY_NAME[name], actor.rng(f"grasp {name}")
+    sizes = [_size_mm(kind, size)] if size else _sizes_mm(kind)
+    for size_mm in sizes[:-1]:
+        with suppress(SetupError):
+            return grasped(actor.subject, kind, 1e-3 * size_mm, rng)
+    return grasped(actor.subject, kind, 1e-3 * sizes[-1], rng)
+
+
+def _sizes_mm(kind: GraspClass) -> list[float]:
+    """The usual one, and what somebody takes whom it does not fit."""
+    usual, least, most = kind.size_mm
+    return [usual, *np.clip([0.92 * usual, 1.08 * usual, 0.85 * usual], least, most).tolist()]
 
 
 def _size_mm(kind: GraspClass, text: str) -> float:
