@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from handstudio.recording.leap import recordings_in
+from handstudio.recording.strokes import kanji_strokes
 from handstudio.simulation.motions.actor import Material
 
 RECORDINGS = "HANDSTUDIO_DATA"
@@ -15,4 +16,5 @@ RECORDINGS = "HANDSTUDIO_DATA"
 def material() -> Material:
     """Everything there is on this machine."""
     folder = os.environ.get(RECORDINGS)
-    return Material(recordings=recordings_in(Path(folder) / "leap") if folder else {})
+    recordings = recordings_in(Path(folder) / "leap") if folder else {}
+    return Material(kanji_strokes, recordings)

@@ -73,7 +73,7 @@ def hand_moving(
     )
     n, k = own.q.shape[:2]
     out = Moving(*(vectors_last(np.empty((size, n, k))) for size in (4, 3, 3, 3, 3, 3)))
-    for children, parents in _GENERATIONS:
+    for children, parents in GENERATIONS:
         if parents == [-1]:
             zero, (t, v, a) = np.zeros((n, 1, 3)), joints.elbow
             places = [x[:, None] + np.zeros((n, 1, 3)) for x in (t, v, a)]
@@ -127,4 +127,5 @@ def _generations() -> list[tuple[list[int], list[int]]]:
     return [(children, [PARENTS[child] for child in children]) for children in levels]
 
 
-_GENERATIONS = _generations()
+GENERATIONS = _generations()
+"""Children and their parents, a depth of the tree each, the root first."""

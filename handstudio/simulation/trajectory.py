@@ -15,6 +15,7 @@ from scipy.interpolate import make_interp_spline
 
 from handstudio.arrays import Array
 from handstudio.hand.skeleton import JOINTS
+from handstudio.simulation.holding import Held
 
 CHANNELS = 3 * len(JOINTS) + 3
 """Of a posture: turns about x, z and y of every joint [rad], then the elbow's place [m]."""
@@ -46,15 +47,24 @@ class JointMotion:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A named stretch of a trajectory [s]: what a label of a take will say."""
+    """A named stretch of a trajectory [s]: what a label of a take will say.
+
+    Attributes:
+        held: What the hand holds meanwhile, if anything.
+    """
 
     start_s: float
     end_s: float
     name: str
+    held: Held | None = None
 
     def later(self, seconds: float) -> Span:
         """The same, later."""
-        return Span(self.start_s + seconds, self.end_s + seconds, self.name)
+        return replace(self, start_s=self.start_s + seconds, end_s=self.end_s + seconds)
+
+    def stretched(self, factor: float) -> Span:
+        """The same in ``factor`` times as long."""
+        return replace(self, start_s=factor * self.start_s, end_s=factor * self.end_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,7 +261,7 @@ def labelled(part: Trajectory, name: str) -> Trajectory:
 def stretched(part: Trajectory, factor: float) -> Trajectory:
     """The same in ``factor`` times as long."""
     powers = factor ** -np.arange(DEGREE, -1.0, -1.0)
-    spans = tuple(Span(factor * s.start_s, factor * s.end_s, s.name) for s in part.spans)
+    spans = tuple(span.stretched(factor) for span in part.spans)
     return replace(
         part,
         breaks_s=part.breaks_s * factor,

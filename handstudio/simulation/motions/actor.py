@@ -14,8 +14,9 @@ from handstudio.errors import SetupError
 from handstudio.simulation.postures import Posture, Script, channels, scripted
 from handstudio.simulation.subject import Subject
 from handstudio.simulation.trajectory import Trajectory, joined
+from handstudio.simulation.world import World
 
-Stroke: TypeAlias = Float[Array, "m 2"]
+Stroke: TypeAlias = Float[Array, "_ 2"]
 """What a pen draws without being lifted: right and up, in heights of a character."""
 
 
@@ -67,12 +68,14 @@ class Actor:
         seed: Of this performance: no two of a person are the same.
         material: What comes from files.
         place: Where in the performance: doing something twice is not doing it the same way.
+        world: Where it is performed, for whoever moves the elbow.
     """
 
     subject: Subject
     seed: int = 0
     material: Material = Material()
     place: str = ""
+    world: World = World()
 
     def again(self, place: str) -> Actor:
         """The same person at another place of the performance."""

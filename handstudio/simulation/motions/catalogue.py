@@ -8,8 +8,10 @@ from handstudio.simulation.motions.actor import Actor, Motion
 from handstudio.simulation.motions.calibration import CALIBRATION
 from handstudio.simulation.motions.chores import CHORES
 from handstudio.simulation.motions.exercises import EXERCISES
+from handstudio.simulation.motions.grasping import GRASPS
 from handstudio.simulation.motions.recorded import RECORDED
 from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.motions.writing import WRITING
 from handstudio.simulation.trajectory import Trajectory
 
 
@@ -24,6 +26,8 @@ FAMILIES = (
     CALIBRATION,
     EXERCISES,
     CHORES,
+    GRASPS,
+    WRITING,
     RECORDED,
 )
 
