@@ -37,6 +37,7 @@ from handstudio.simulation.motions.language import perform
 from handstudio.simulation.rig import Truth
 from handstudio.simulation.subject import Subject, ideal_subject
 from handstudio.simulation.subject import subject as virtual_subject
+from handstudio.simulation.things import things_held
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.worn import Worn, begin, sense, wear
 from handstudio.stream import EventStream
@@ -141,7 +142,7 @@ def simulate(
         writer.discard()  # it can be simulated again
         raise
     labels = tuple(
-        Label(span.start_s, min(span.end_s, seconds), span.name)
+        Label(float(span.start_s), float(min(span.end_s, seconds)), span.name)
         for span in sorted(trajectory.spans, key=lambda span: span.start_s)
         if span.start_s < seconds
     )
@@ -255,6 +256,8 @@ def _truth_file(
     def whole(name: str) -> Array:
         return np.concatenate([getattr(truth, name) for truth in truths])[:count]
 
+    q_world_segment, t_world_joint = whole("q_world_segment"), whole("t_world_joint")
+    held = things_held(rehearsed.trajectory, time_us[:count], q_world_segment, t_world_joint)
     subject, mounting = rehearsed.subject, rehearsed.worn.mounting
     skeleton, mechanism = subject.skeleton, subject.mechanism
     facts = {
@@ -264,13 +267,14 @@ def _truth_file(
         "motion": rehearsed.motion,
         "imperfections": tell(rehearsed.imperfections),
         "seed": rehearsed.seed,
+        "held": held.told,
     }
     return TruthFile(
         time_us=time_us[:count],
         sensors=setup.layout.names,
-        q_world_segment=whole("q_world_segment"),
+        q_world_segment=q_world_segment,
         q_world_sensor=whole("q_world_sensor"),
-        t_world_joint=whole("t_world_joint"),
+        t_world_joint=t_world_joint,
         t_world_sensor=whole("t_world_sensor"),
         t_world_tip=whole("t_world_tip"),
         angles=whole("angles"),
@@ -282,5 +286,8 @@ def _truth_file(
         t_segment_sensor=mounting.t_segment_sensor,
         axes=mechanism.axes,
         points=mechanism.points,
+        q_world_held=held.q_world_held,
+        t_world_held=held.t_world_held,
+        pen_down=held.pen_down,
         facts=msgspec.json.encode(facts).decode(),
     )

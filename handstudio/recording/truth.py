@@ -12,7 +12,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
@@ -40,6 +40,9 @@ class TruthFile:
             ``rotate(conjugate(q_segment_sensor), -t_segment_sensor)``.
         axes: Axes of flexion, deviation and rotation of every joint, in its rest frame.
         points: A point of each.
+        q_world_held: Attitude of what the hand held, a pen's z along it to its end; NaN: nothing.
+        t_world_held: Place of its origin: a pen's tip, the middle of anything else.
+        pen_down: Whether a pen wrote.
         facts: JSON: person, motion, imperfections, seed, and whatever the motion held or wrote.
     """
 
@@ -59,6 +62,9 @@ class TruthFile:
     t_segment_sensor: Float[Array, "s 3"]
     axes: Float[Array, "k 3 3"]
     points: Float[Array, "k 3 3"]
+    q_world_held: Float[Array, "n 4"]
+    t_world_held: Float[Array, "n 3"]
+    pen_down: Bool[Array, " n"]
     facts: str
 
 
@@ -69,6 +75,8 @@ _OF_EVERY_INSTANT = (
     "t_world_sensor",
     "t_world_tip",
     "angles",
+    "q_world_held",
+    "t_world_held",
 )
 
 

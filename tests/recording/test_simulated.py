@@ -93,3 +93,21 @@ def test_a_file_that_holds_no_truth_is_told(tmp_path):
     truth_path(path).unlink()
     with pytest.raises(TakeError, match="truth of a take"):
         load_truth(path)
+
+
+def test_things_in_the_hand_are_part_of_the_truth(tmp_path):
+    worn = rehearse(3, "static+grasp:power_sphere", seed=5)
+    truth = load_truth(simulate(tmp_path, worn, rate_hz=50))
+    (ball,) = json.loads(truth.facts)["held"]
+    assert (ball["name"], ball["shape"], ball["radius_m"]) == (
+        "grasp:power_sphere",
+        "sphere",
+        0.0375,
+    )
+    now = (truth.time_us >= ball["start_s"] * 1e6) & (truth.time_us <= ball["end_s"] * 1e6)
+    known = np.isfinite(truth.t_world_held).all(axis=1)
+    assert (known != now).sum() <= 2  # where a span ends on an instant
+    assert not truth.pen_down.any()
+    # it lies in the palm: the fingertips' bones are around it, a finger's half depth outside
+    off = np.linalg.norm(truth.t_world_tip[known] - truth.t_world_held[known][:, None], axis=-1)
+    assert 0.035 < off.min() < off.max() < 0.065

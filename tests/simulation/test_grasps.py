@@ -79,6 +79,7 @@ def test_a_size_can_be_asked_for():
     assert held.shape == Sphere(0.030)
 
 
+@pytest.mark.long
 def test_the_hand_is_open_before_and_after_and_holds_for_a_while():
     trajectory = perform("grasp:tripod", Actor(subject(1)))
     held, start_s, end_s = object_of(trajectory)
@@ -91,6 +92,7 @@ def test_the_hand_is_open_before_and_after_and_holds_for_a_while():
     np.testing.assert_allclose(inside, np.tile(inside[0], (50, 1)), atol=1e-12)
 
 
+@pytest.mark.long
 def test_last_joints_follow_the_ones_before_softly():
     posture = grasp_of(Actor(subject(0)), "power_sphere").posture
     for finger in ("middle", "ring"):

@@ -10,11 +10,12 @@ from handstudio.maths import so3
 from handstudio.recording.strokes import kanji_strokes
 from handstudio.simulation.motions.actor import Actor, Material
 from handstudio.simulation.motions.language import perform
-from handstudio.simulation.motions.pen import HeldPen, PenTruth, held_pen, pen_truth
+from handstudio.simulation.motions.pen import HeldPen, held_pen
 from handstudio.simulation.motions.writing import HEIGHT_M
 from handstudio.simulation.placing import TURNS, limits
 from handstudio.simulation.rig import hand_at
 from handstudio.simulation.subject import DEVELOPMENT, REPORTING, subject
+from handstudio.simulation.things import Things, things_held
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.world import World
 
@@ -36,8 +37,7 @@ def written(text: str, number: int = 3, side: str = "right", world: World | None
     trajectory = perform(f'writing:"{text}"', Actor(someone, seed, Material(box), world=world))
     time_us = np.arange(0, int(trajectory.duration_s * 1e6), EVERY_US)
     _, segments = hand_at(someone, trajectory, time_us * 1e-6, world)
-    truth = pen_truth(trajectory, time_us, segments.q, segments.t)
-    assert truth is not None
+    truth = things_held(trajectory, time_us, segments.q, segments.t)
     return trajectory, time_us * 1e-6, segments, truth
 
 
@@ -46,9 +46,9 @@ def pen_of(trajectory: Trajectory) -> HeldPen:
     return pen
 
 
-def on_paper(truth: PenTruth, world: World) -> np.ndarray:
+def on_paper(truth: Things, world: World) -> np.ndarray:
     """The trace as the writer sees it [m]."""
-    trace = so3.rotate(so3.conjugate(world.q_world_start), truth.t_world_pen)
+    trace = so3.rotate(so3.conjugate(world.q_world_start), truth.t_world_held)
     return trace[truth.pen_down, :2]
 
 
@@ -92,7 +92,7 @@ def test_four_characters_are_legible(four):
 def test_the_pen_touches_the_paper_in_strokes_and_leaves_it_between(four):
     trajectory, _, _, truth = four
     pen = pen_of(trajectory)
-    height = truth.t_world_pen[:, 2] - pen.desk_m
+    height = truth.t_world_held[:, 2] - pen.desk_m
     assert np.nanmin(height) > -0.00002
     assert 0.004 < np.nanmax(height) < 0.009
     starts = np.count_nonzero(np.diff(truth.pen_down.astype(int)) == 1)
@@ -103,7 +103,7 @@ def test_the_pen_touches_the_paper_in_strokes_and_leaves_it_between(four):
 
 def test_a_pen_runs_at_a_human_pace(four):
     _, time_s, _, truth = four
-    speed = np.linalg.norm(np.gradient(truth.t_world_pen, time_s, axis=0), axis=-1)
+    speed = np.linalg.norm(np.gradient(truth.t_world_held, time_s, axis=0), axis=-1)
     assert 0.03 < np.nanmean(speed[truth.pen_down]) < 0.08
     assert np.nanmax(speed[truth.pen_down]) < 0.30
 
@@ -111,10 +111,10 @@ def test_a_pen_runs_at_a_human_pace(four):
 def test_three_fingertips_hold_it_without_slipping(four):
     trajectory, time_s, segments, truth = four
     pen = pen_of(trajectory)
-    held = np.isfinite(truth.t_world_pen[:, 0])
+    held = np.isfinite(truth.t_world_held[:, 0])
     skin = pen.skin(segments.q[held], segments.t[held])
-    contacts = so3.rotate(truth.q_world_pen[held][:, None], pen.contacts)
-    slip = np.linalg.norm(skin - contacts - truth.t_world_pen[held][:, None], axis=-1)
+    contacts = so3.rotate(truth.q_world_held[held][:, None], pen.contacts)
+    slip = np.linalg.norm(skin - contacts - truth.t_world_held[held][:, None], axis=-1)
     assert slip.max() < 5e-6
     np.testing.assert_allclose(np.hypot(*pen.contacts.T[:2]), pen.radius_m, atol=5e-5)
     assert (np.abs(pen.contacts[:, 2] - 0.030) < 0.010).all()
@@ -143,12 +143,14 @@ def test_characters_are_named_in_their_order(four):
     assert all(a.end_s <= b.start_s for a, b in pairwise(spans[:4]))
 
 
+@pytest.mark.long
 def test_a_left_hand_writes_the_same_text():
     *_, truth = written("大", 5, "left")
     off, _ = aligned(on_paper(truth, World())[::4], asked("大"))
     assert np.sqrt(np.mean(off**2)) < 0.0005
 
 
+@pytest.mark.long
 def test_a_long_text_moves_the_elbow_along_and_to_the_next_line():
     """Wherever the forearm points: the text lies on the paper, not in the world's axes."""
     world = World(heading_rad=-1.1)
@@ -162,6 +164,7 @@ def test_a_long_text_moves_the_elbow_along_and_to_the_next_line():
     assert 0.1 < np.ptp(elbow, axis=0).max() < 0.2
 
 
+@pytest.mark.long
 def test_a_space_is_room():
     *_, together = written("xy")
     *_, apart = written("x y")
@@ -169,6 +172,7 @@ def test_a_space_is_room():
     assert wider == pytest.approx(0.5 * HEIGHT_M, abs=0.001)
 
 
+@pytest.mark.long
 def test_a_seed_is_a_performance():
     first, again, other = (written("x", seed=seed)[0] for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.coefficients, again.coefficients)
@@ -206,10 +210,10 @@ def test_everybody_can_write(number, side):
     pen, (least, most) = pen_of(trajectory), limits(subject(number, side))
     off, _ = aligned(on_paper(truth, World())[::4], asked("同志社大"))
     assert np.sqrt(np.mean(off**2)) < 0.0005
-    held = np.isfinite(truth.t_world_pen[:, 0])
-    contacts = so3.rotate(truth.q_world_pen[held][:, None], pen.contacts)
+    held = np.isfinite(truth.t_world_held[:, 0])
+    contacts = so3.rotate(truth.q_world_held[held][:, None], pen.contacts)
     slip = pen.skin(segments.q[held], segments.t[held]) - contacts
-    assert np.abs(slip - truth.t_world_pen[held][:, None]).max() < 5e-6
+    assert np.abs(slip - truth.t_world_held[held][:, None]).max() < 5e-6
     posture, _, acceleration = trajectory.derivatives(time_s)
     assert (posture[held] >= least - 1e-9).all()
     assert (posture[held] <= most + 1e-9).all()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
 from handstudio.hand.angles import joint_index
@@ -20,7 +20,6 @@ from handstudio.simulation.placing import Placed, Placer, limits, outwards, plac
 from handstudio.simulation.postures import channels
 from handstudio.simulation.solving import solved
 from handstudio.simulation.subject import Subject
-from handstudio.simulation.trajectory import Trajectory
 
 HOLDING = ("thumb_distal", "index_distal", "middle_distal")
 TOUCHING_M = 0.0002
@@ -146,42 +145,6 @@ class HeldPen:
         """Whether a tip there touches the paper; False where it is unknown (NaN)."""
         down: Array = t_world_pen[:, 2] - self.desk_m < TOUCHING_M
         return down
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PenTruth:
-    """Where a pen truly was.
-
-    Attributes:
-        q_world_pen: Attitude, z along the pen to its end; NaN while none is held.
-        t_world_pen: Place of its tip [m]; NaN while none is held.
-        pen_down: Whether it wrote.
-    """
-
-    q_world_pen: Float[Array, "n 4"]
-    t_world_pen: Float[Array, "n 3"]
-    pen_down: Bool[Array, " n"]
-
-
-def pen_truth(
-    trajectory: Trajectory,
-    time_us: Int64[Array, " n"],
-    q_world_segment: Float[Array, "n k 4"],
-    t_world_joint: Float[Array, "n k 3"],
-) -> PenTruth | None:
-    """Where the pens of a motion are, from its true segments; None where nobody writes."""
-    time_s = time_us * 1e-6 - trajectory.begins_s
-    time_s = np.mod(time_s, trajectory.duration_s) if trajectory.periodic else time_s
-    q, t = np.full((len(time_us), 4), np.nan), np.full((len(time_us), 3), np.nan)
-    down, pens = np.zeros(len(time_us), dtype=bool), 0
-    for span in trajectory.spans:
-        if not isinstance(span.held, HeldPen):
-            continue
-        pens += 1
-        now = (span.start_s <= time_s) & (time_s <= span.end_s)
-        q[now], t[now] = span.held.pose(q_world_segment[now], t_world_joint[now])
-        down[now] = span.held.writes(t[now])
-    return PenTruth(q, t, down) if pens else None
 
 
 @lru_cache(maxsize=16)
