@@ -50,6 +50,8 @@ _JOINTS = (
         for joint, n in (("mcp", 2), ("pip", 1), ("dip", 1))
     ),
 )
+_THUMB_TURNS = 7  # and the palm's, which come first
+_OPENED = 0.4
 _PHALANGES = tuple(
     f"{finger}_{part}"
     for finger in FINGERS
@@ -87,7 +89,7 @@ def grasped(subject: Subject, kind: GraspClass, size_m: float, rng: np.random.Ge
     least, most = np.concatenate([least, -slides, -free]), np.concatenate([most, slides, free])
     for _ in range(_ATTEMPTS):
         search = _search(subject, kind, kind.shape(size_m), size_m, rng)
-        found = search.start()
+        found = search.opened()
         for exact_m, within in _EXACT_M:
             search = replace(search, exact_m=exact_m)
             found = solved(search.residuals, found, least, most, within=within, tries=50)
@@ -135,6 +137,13 @@ class _Search:
     def start(self) -> Array:
         """Habit."""
         return np.append(self.habit[self.active], np.zeros(len(self.skin.segments) + 6))
+
+    def opened(self) -> Array:
+        """Habit with straighter fingers about what lies in the palm, or they start behind it."""
+        start = self.start()
+        if self.kind.place is not None:
+            start[_THUMB_TURNS : len(self.active)] *= _OPENED
+        return start
 
     def postures(self, x: Array) -> Array:
         """Unknowns as postures."""
