@@ -223,6 +223,7 @@ def _thesis(people: Sequence[int], strengths: Imperfections) -> dict[str, Any]:
 
 def _tried(words: str, what: Callable[[T], R], tasks: Sequence[T]) -> list[R]:
     """Results of all tasks, in their order, on all cores."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # small systems, and a process a core already
     with (
         multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool,
         progress(words) as share,

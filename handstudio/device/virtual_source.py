@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -20,6 +21,9 @@ START_S = 20.0
 
 _TX_BUFFER = 1 << 18
 """Of our own glove [bytes]: rides out 0.6 s at 1000 Hz of a machine that a browser keeps busy."""
+
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""Small systems of equations take ten times as long where threads wait for a busy core."""
 
 _OPTIONS = (
     "subject",
@@ -104,6 +108,7 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
             stdout=subprocess.PIPE,
             text=True,
             encoding="utf-8",
+            env=os.environ | _ONE_THREAD,
             start_new_session=True,  # Ctrl-C in the terminal is for us: the glove ends with us
         )
     except OSError as error:

@@ -44,8 +44,21 @@ def grasp(actor: Actor, argument: str) -> Trajectory:
 
 
 def grasps(actor: Actor, _: str) -> Trajectory:
-    """All classes on things of their usual sizes, one after the other."""
-    return joined([grasp(actor, kind.name) for kind in CLASSES])
+    """All classes on things of their usual sizes, one after the other; none that does not fit.
+
+    Raises:
+        SetupError: nothing fits this hand.
+    """
+    done: list[Trajectory] = []
+    misfit: SetupError | None = None
+    for kind in CLASSES:
+        try:
+            done.append(grasp(actor, kind.name))
+        except SetupError as error:
+            misfit = error
+    if misfit is not None and not done:
+        raise misfit
+    return joined(done)
 
 
 GRASPS = (
@@ -56,7 +69,11 @@ GRASPS = (
         f"a class, or class/size in mm; classes: {', '.join(_BY_NAME)}",
         "power_sphere",
     ),
-    Motion("grasps", "All sixteen grasps, one after the other", grasps),
+    Motion(
+        "grasps",
+        "All sixteen grasps in a row, but those that do not fit this hand",
+        grasps,
+    ),
 )
 
 
