@@ -39,9 +39,10 @@ from handstudio.simulation.imperfections.strengths import (
 from handstudio.simulation.subject import DEVELOPMENT, REPORTING
 
 WORK = (
-    "quick_start+joint_by_joint&elbow_moving:all 10+2*open_close&elbow_moving:all 20"
+    "quick_start+joint_by_joint&elbow_moving:all 10+3*open_close&elbow_moving:all 30"
     "+scissors&elbow_moving:all 15+pouring+typing+tissue+ball_throw+grasps"
-    "+writing:hand+typing&elbow_moving:all 15+joint_by_joint&elbow_moving:all 10+spinning_top"
+    "+writing:hand+pouring+typing&elbow_moving:all 15+joint_by_joint&elbow_moving:all 10"
+    "+spinning_top"
 )
 """Five minutes of work, most of it with the elbow moving."""
 

@@ -139,7 +139,8 @@ def _draw_thesis(axes: Any, experiment: dict[str, Any]) -> None:
         axes.bar(at + width * (k - 4), heights, width, label=f"{name}, {where}", hatch=hatch)
     axes.set_xticks(at, list(settings))
     axes.set(title="The thesis's experiment: mean of five sensors", ylabel="RMSE norm [deg]")
-    axes.legend(fontsize=8)
+    axes.set_ylim(top=1.45 * axes.get_ylim()[1])  # room for the legend
+    axes.legend(fontsize=8, ncols=2, loc="upper left")
     axes.grid(axis="y", alpha=0.3)
 
 
