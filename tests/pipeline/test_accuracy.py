@@ -1,7 +1,7 @@
 """How far a simulated glove's angles are from the truth: a bound that says when something broke.
 
-Measured when this was written, with VQF, on six gloves, one round of the showcase each: 0.61 to
-1.00 deg over all angles, 1.6 to 2.2 deg for the worst angle, 2.3 to 3.1 deg at the worst instant.
+Measured with VQF, on six gloves, one round of the showcase each: 0.61 to 1.07 deg over all angles,
+1.1 to 2.2 deg for the worst angle.
 Most of it is the error of the attitude at rest. Sensors sit exactly along their segments here, so
 this is no figure for a real hand.
 """
