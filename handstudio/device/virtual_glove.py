@@ -18,23 +18,17 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from handstudio.device.wearer import Wearer
 from handstudio.errors import HandstudioError
-from handstudio.protocol.packets import Result
-from handstudio.recording.material import material
-from handstudio.recording.simulated import Rehearsed, described, rehearse
+from handstudio.recording.simulated import described, rehearse
 from handstudio.simulation.firmware import RATES_HZ, Firmware
 from handstudio.simulation.glove import Wire, WornGlove
 from handstudio.simulation.imperfections.strengths import parse
-from handstudio.simulation.motions.actor import Actor
-from handstudio.simulation.motions.language import parse as parsed
-from handstudio.simulation.motions.language import perform
-from handstudio.simulation.motions.naming import resolve
 
 _LONGEST_PAUSE_S = 0.1  # how long an order to stop may go unseen
 _SHORTEST_PAUSE_S = 0.001  # a USB device is asked once a millisecond too
@@ -132,43 +126,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with closing(_open(asked)) as line:
         print(json.dumps({"address": line.address}), flush=True)
         serve(line, firmware, stop, asked.speed)
-
-
-class Wearer:
-    """Does what it is asked, in a thread: thinking about how to write a word takes seconds."""
-
-    _AT_ONCE_S = 0.02  # what is thought of by then is told with the reply
-
-    def __init__(self, rehearsed: Rehearsed, worn: WornGlove) -> None:
-        self._rehearsed, self._worn = rehearsed, worn
-        self._thinking = ThreadPoolExecutor(1, thread_name_prefix="wearer")
-        self._thought: Future[float] | None = None
-        self._times = 0
-
-    def asked(self, text: str) -> tuple[Result, str]:
-        """Begin to do what the text says; the answer for the host."""
-        if self._thought is not None and not self._thought.done():
-            return Result.BUSY, "still thinking about the last one"
-        try:
-            motion = resolve(text)
-            parsed(motion)
-        except HandstudioError as error:
-            return Result.BAD_ARGUMENT, str(error)
-        self._times += 1
-        self._thought = self._thinking.submit(self._perform, motion, f"asked {self._times}")
-        try:
-            return Result.OK, f"{self._thought.result(self._AT_ONCE_S):.1f} s"
-        except TimeoutError:
-            return Result.OK, "thinking"
-        except HandstudioError as error:
-            return Result.BAD_ARGUMENT, str(error)
-
-    def _perform(self, motion: str, place: str) -> float:
-        rehearsed = self._rehearsed
-        actor = Actor(rehearsed.subject, rehearsed.seed, material(), place)
-        trajectory = perform(motion, actor)
-        self._worn.turn_to(trajectory)
-        return trajectory.duration_s
 
 
 def _parser() -> argparse.ArgumentParser:
