@@ -261,28 +261,35 @@ class _Stream:
     def __init__(self, sensors: Sensors, began_us: int, rate_hz: int, block: int | None) -> None:
         self._sensors, self._size = sensors, block
         self._began_us = began_us
-        self._read_ahead(began_us, rate_hz)
+        self._rate_hz = rate_hz
+        self._ahead = self._block(began_us)
 
     @property
     def due_us(self) -> int:
         """When the next instant is [µs]."""
-        return int(self._block_us[self._at])
+        return self._ahead[0][0]
 
     def change_rate(self, now_us: int, rate_hz: int) -> None:
         """Go on at another rate, one of its periods from now."""
-        self._read_ahead(now_us + _SECOND_US // rate_hz, rate_hz)
+        self._rate_hz = rate_hz
+        self._ahead = self._block(now_us + self._period_us)
 
     def take(self) -> tuple[Readings, int]:
         """The block and where in it the instant is that is due; the next becomes due."""
-        block, at = self._block, self._at
-        self._at += 1
-        if self._at == len(self._block_us):
-            self._read_ahead(int(self._block_us[-1]) + self._period_us, self._rate_hz)
+        due_us, block, at = self._ahead[0]
+        if len(self._ahead) == 1:
+            self._ahead = self._block(due_us + self._period_us)
+        else:
+            self._ahead.popleft()
         return block, at
 
-    def _read_ahead(self, first_us: int, rate_hz: int) -> None:
-        self._rate_hz, self._period_us = rate_hz, _SECOND_US // rate_hz
-        size = self._size or max(1, rate_hz // 10)
-        self._block_us = first_us + self._period_us * np.arange(size)
-        self._block = self._sensors(self._block_us - self._began_us, rate_hz)
-        self._at = 0
+    @property
+    def _period_us(self) -> int:
+        return _SECOND_US // self._rate_hz
+
+    def _block(self, first_us: int) -> deque[tuple[int, Readings, int]]:
+        """The next instants: when each is due, and where its readings are."""
+        size = self._size or max(1, self._rate_hz // 10)
+        due_us = first_us + self._period_us * np.arange(size)
+        block = self._sensors(due_us - self._began_us, self._rate_hz)
+        return deque((due, block, at) for at, due in enumerate(due_us.tolist()))

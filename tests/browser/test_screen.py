@@ -210,6 +210,7 @@ def test_the_browsers_language_is_spoken_and_another_can_be_chosen(
     expect(page.get_by_role("tab", name="Review")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_full_disk_begins_no_take(
     start_studio: Start, visit: Callable[..., Page], tiny_disk: Path
 ) -> None:
@@ -222,6 +223,7 @@ def test_a_full_disk_begins_no_take(
     expect(button(page, "Record")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_diagnostics_come_with_one_click(start_studio: Start, visit: Callable[..., Page]) -> None:
     page = visit(start_studio("--virtual"))
     expect(page.get_by_text("Connected")).to_be_visible()

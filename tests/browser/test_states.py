@@ -34,6 +34,7 @@ def test_without_a_device_it_says_what_to_do(
     expect(page.get_by_text("No device")).to_be_visible()
 
 
+@pytest.mark.long
 def test_an_address_that_is_none_is_explained(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
