@@ -203,6 +203,8 @@ NO_TESTS = 5
 def test(options: list[str]) -> int:
     """Run every check, also after one failed, and say at the end which did."""
     os.environ["HANDSTUDIO_CHROMIUM"] = find_chromium()
+    # two workers on two cores: small equations take ten times as long where their threads wait
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     checks = {
         "ruff check": ["ruff", "check", "."],
         "ruff format": ["ruff", "format", "--check", "."],

@@ -34,13 +34,13 @@ def test_a_take_is_recorded_replayed_and_exported(
     page = visit(studio, 1440, 900)
     expect(page.get_by_text("Connected")).to_be_visible()
     page.wait_for_timeout(4500)  # past the rest the showcase begins with
-    record(page, 4.0)
+    record(page, 6.0)
 
     take = only(studio.sessions.glob("*/*/*.mcap"))
     assert settles_within(page, 10.0), "a paused take stands still"
 
     button(page, "Play").click()
-    assert moves_within(page, 5.0)
+    assert moves_within(page, 10.0)
     expect(page.get_by_text(re.compile(r"\d:(0[1-9]|[1-9]\d)\.\d / "))).to_be_visible()
     scrub_to(page, 0.5)
 
