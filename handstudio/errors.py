@@ -107,3 +107,7 @@ class SetupError(HandstudioError):
 
 class SettingsError(HandstudioError):
     """What the studio remembers cannot be read, makes no sense, or cannot be kept."""
+
+
+class CalibrationError(HandstudioError):
+    """A calibration cannot be computed from what was recorded, or cannot be read."""

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
 from handstudio.calibration.mounting import nominal_mounting
+from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import LayoutError
 from handstudio.hand.angles import (
     ROOT_ANGLES,
@@ -19,7 +20,14 @@ from handstudio.hand.angles import (
     joint_index,
 )
 from handstudio.hand.pose import Pose, posed
-from handstudio.hand.skeleton import PARENTS, SEGMENTS, HandSide, Skeleton, nominal_skeleton
+from handstudio.hand.skeleton import (
+    FINGERS,
+    PARENTS,
+    SEGMENTS,
+    HandSide,
+    Skeleton,
+    nominal_skeleton,
+)
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
@@ -40,7 +48,7 @@ class HandFit:
 
 
 def fit_of(setup: Setup) -> HandFit:
-    """The hand a setup describes: mean proportions of its length, sensors as the maker meant them.
+    """The hand a setup describes: the calibrated one, else mean proportions of its length.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -51,9 +59,36 @@ def fit_of(setup: Setup) -> HandFit:
             "{why} {why.remedy}",
             why=setup.layout.no_hand,
         )
+    if setup.subject is not None:
+        return fit_of_calibration(setup.subject, setup.layout)
     side: HandSide = "left" if setup.layout.side == "left" else "right"
     skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
     return HandFit(skeleton, nominal_mounting(setup.layout))
+
+
+def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandFit:
+    """The hand a calibration describes, on a glove of this layout.
+
+    A sensor that the calibration does not know sits as the maker meant it.
+    """
+    known = {segment.name: segment for segment in calibration.segments}
+    tips = {tip.finger: tip for tip in calibration.tips}
+    nominal = nominal_skeleton(calibration.side, calibration.hand_length_m)
+    joint, rest = nominal.t_parent_joint.copy(), nominal.q_parent_rest.copy()
+    for index, name in enumerate(SEGMENTS):
+        if name in known:
+            joint[index] = known[name].t_parent_joint
+            rest[index] = known[name].q_parent_rest
+    ends = nominal.t_distal_tip.copy()
+    for index, finger in enumerate(FINGERS):
+        if finger in tips:
+            ends[index] = tips[finger].t_distal_tip
+    q_sensor_segment = nominal_mounting(layout)
+    for sensor, place in enumerate(layout.sensors):
+        segment = known.get(place.segment)
+        if segment is not None and segment.sensor == place.sensor:
+            q_sensor_segment[sensor] = segment.q_sensor_segment
+    return HandFit(Skeleton(calibration.side, joint, rest, ends), q_sensor_segment)
 
 
 def segment_attitudes(

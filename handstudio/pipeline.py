@@ -17,8 +17,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64, UInt8
 
 from handstudio.arrays import Array
+from handstudio.calibration.device import corrected
 from handstudio.calibration.rest import REST_S, first_rest
 from handstudio.errors import SetupError
+from handstudio.maths import so3
 from handstudio.samples import Event, Gap, ImuSamples, Why
 from handstudio.setup import Setup
 
@@ -103,10 +105,10 @@ def run(setup: Setup, state: State, events: Iterable[Event]) -> tuple[Motion, St
             case Gap():
                 pass  # the step in the clock tells the same, and how long it was
             case ImuSamples() if event.gyr.shape[1] == sensors:
-                state = _run_samples(setup, state, event, motions)
+                state = _run_samples(setup, state, _freed(setup, event), motions)
             case ImuSamples():
                 pass  # of a device that restarted with other sensors: not this setup's motion
-    return join(motions), state
+    return _turned(setup, join(motions)), state
 
 
 def empty(sensors: int) -> Motion:
@@ -127,6 +129,24 @@ def join(motions: list[Motion]) -> Motion:
 
 
 _FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
+
+
+def _freed(setup: Setup, samples: ImuSamples) -> ImuSamples:
+    """Readings without the errors of the sensors, as far as they are known."""
+    return samples if setup.sensors is None else corrected(samples, setup.sensors, setup.layout.names)
+
+
+def _turned(setup: Setup, motion: Motion) -> Motion:
+    """Orientations whose headings agree (4.22): a turn of each sensor about the vertical."""
+    if not setup.heading_rad:
+        return motion
+    turns = so3.about_z(np.array(setup.heading_rad))
+    start = motion.q_world_start
+    forearm = setup.layout.drivers.get("forearm")
+    if forearm is not None:
+        start = so3.multiply(turns[forearm], start)
+    turned = so3.multiply(turns, motion.q_world_sensor)
+    return replace(motion, q_world_sensor=turned, q_world_start=start)
 
 
 def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[Motion]) -> State:

@@ -7,7 +7,9 @@ from typing import TypeAlias
 
 import msgspec
 
-from handstudio.errors import SetupError
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.subject import SubjectCalibration
+from handstudio.errors import CalibrationError, SetupError
 from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
 from handstudio.fusion.vqf_filter import VqfFilter
@@ -24,6 +26,10 @@ FILTERS: dict[str, AnyFilter] = {
     "raw": RawFilter(),
     "filter1": Filter1(),
 }
+
+
+NOMINAL_ZERO = "nominal mounting: sensor axes taken as segment axes"
+NO_CALIBRATION = "none (mean adult proportions scaled by hand length)"
 
 
 class Device(msgspec.Struct, frozen=True):
@@ -56,6 +62,10 @@ class Setup(msgspec.Struct, frozen=True):
         device: Where the data came from.
         zero: What joint angles are measured from.
         calibration: Identity of the subject calibration in use.
+        sensors: Errors of the sensors, taken off the readings before anything else.
+        heading_rad: By how much each sensor's orientation is turned about the vertical after
+            fusion, in the order of the layout (4.22); empty: not at all.
+        subject: The wearer's own hand, and how the glove sits on it; None: ``hand`` and the maker.
     """
 
     layout: Layout
@@ -66,8 +76,11 @@ class Setup(msgspec.Struct, frozen=True):
     filter: AnyFilter = VqfFilter()
     hand: HandModel = HandModel()
     device: Device | None = None
-    zero: str = "nominal mounting: sensor axes taken as segment axes"
-    calibration: str = "none (mean adult proportions scaled by hand length)"
+    zero: str = NOMINAL_ZERO
+    calibration: str = NO_CALIBRATION
+    sensors: DeviceCalibration | None = None
+    heading_rad: tuple[float, ...] = ()
+    subject: SubjectCalibration | None = None
 
     @property
     def key(self) -> str:
@@ -101,6 +114,34 @@ def for_device(
             description.firmware,
             description.protocol,
         ),
+    )
+
+
+def calibrated(
+    setup: Setup,
+    *,
+    subject: SubjectCalibration | None = None,
+    sensors: DeviceCalibration | None = None,
+) -> Setup:
+    """A setup with what is known of wearer and glove; None: nothing, as the maker meant it.
+
+    Raises:
+        CalibrationError: the calibration is of the other hand.
+    """
+    if subject is not None and subject.side != setup.layout.side:
+        raise CalibrationError(
+            "The calibration {id} is of a {side} hand; this glove is on a {other} one.",
+            "Calibrate this hand, or mirror the calibration: handstudio mirror.",
+            id=subject.id,
+            side=subject.side,
+            other=setup.layout.side,
+        )
+    return msgspec.structs.replace(
+        setup,
+        subject=subject,
+        sensors=sensors,
+        zero=NOMINAL_ZERO if subject is None else "flat hand, functional axes",
+        calibration=NO_CALIBRATION if subject is None else subject.id,
     )
 
 
