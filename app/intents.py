@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from app.look import View
 from handstudio.export.csv import Content
+from handstudio.wizards import course
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,7 @@ class SaveSubject:
     side: str
     hand_length_mm: float
     then_record: bool = False
+    then_begin: str = ""  # a course
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,6 +327,46 @@ class FaceForward:
     """Turn the picture so that the forearm points away from the viewer."""
 
 
+@dataclass(frozen=True, slots=True)
+class BeginCourse:
+    """Begin a guided course, or go on with one that was left."""
+
+    name: str
+    anew: bool = False
+    page: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """Say this to the course that is on."""
+
+    event: course.Event
+
+
+@dataclass(frozen=True, slots=True)
+class RedoStep:
+    """One step of the course once more, be it on or over."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveCourse:
+    """No more for now; the course goes on another time."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloseResult:
+    """What came of the course was seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResetHeading:
+    """Take the heading anew, of one sensor or, with None, of all."""
+
+    sensor: str | None = None
+
+
 Move: TypeAlias = TogglePlay | Seek | Step | SetSpeed | MarkIn | MarkOut | WholeTake | SetLoop
 """What moves through the open take."""
 
@@ -376,4 +418,10 @@ Intent: TypeAlias = (
     | SetLoop
     | Export
     | FaceForward
+    | BeginCourse
+    | Guide
+    | RedoStep
+    | LeaveCourse
+    | CloseResult
+    | ResetHeading
 )

@@ -5,13 +5,16 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
+from handstudio.calibrate import Calibrated, calibrate
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.process import process
+from handstudio.recording.calibrations import save_calibration
 from handstudio.recording.take import open_take
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
@@ -55,6 +58,11 @@ class Jobs:
         """Write a CSV of a part of a take."""
         self._reset()
         return self._pool.submit(_export, path, target, content, window)
+
+    def calibrate(self, paths: Sequence[Path], sessions: Path) -> Future[Calibrated]:
+        """Compute the calibration of a subject from takes, and keep it with the subject."""
+        self._reset()
+        return self._pool.submit(_calibrate, tuple(paths), sessions)
 
     def cancel(self) -> None:
         """Stop the present job at its next step; its future then raises `Stopped`."""
@@ -101,3 +109,9 @@ def _export(path: Path, target: Path, content: Content, window: Window) -> Path:
     take = open_take(path)
     motion = process(take, progress=_tell)
     return export_csv(take, take.header.setup, motion, target, content=content, window=window)
+
+
+def _calibrate(paths: tuple[Path, ...], sessions: Path) -> Calibrated:
+    calibrated = calibrate([open_take(path) for path in paths], _tell)
+    save_calibration(sessions, calibrated.calibration)
+    return calibrated

@@ -31,6 +31,11 @@ class View(Enum):
 LASTING = (View.DESK, View.FOLLOW)
 """Views that suit whatever the hand does next, and so are kept from one start to the next."""
 
+COURSE_NEAR = (-0.14, -0.16, 0.52), (-0.12, 0.24, -0.02)
+COURSE_FAR = (-0.13, -0.55, 0.55), (-0.13, 0.12, -0.02)
+"""Where from and where to while a course is on: room for the hand that shows it, and below for the
+sheet; farther away where whole arms move."""
+
 DESK_PLACE = (-0.15, -0.03, 0.46)
 DESK_TARGET = (0.0, 0.31, 0.0)
 
@@ -46,6 +51,13 @@ class Camera:
     place: Float[Array, "3"]
     target: Float[Array, "3"]
     up: Float[Array, "3"]
+
+
+def course_camera(side: str, *, near: bool) -> Camera:
+    """The camera while a course is on: both hands above the sheet."""
+    place, target = map(np.array, COURSE_NEAR if near else COURSE_FAR)
+    mirror = np.array([-1.0 if side == "left" else 1.0, 1.0, 1.0])
+    return Camera(place * mirror, target * mirror, np.array([0.0, 0.0, 1.0]))
 
 
 def camera_for(view: View, skeleton: Skeleton | None, pose: Pose | None, yaw: float) -> Camera:

@@ -10,9 +10,10 @@ from app.boards import BOARD_M, Boards, boards_of
 from app.bones import BoneSet, bone_sets, hand_length, joint_radii
 from app.look import DESK_TARGET, Camera
 from app.meshes import mesh
+from app.views.course import GhostView
 from app.views.page import HandView, SensorsView
 from handstudio.arrays import Array
-from handstudio.hand.skeleton import SEGMENTS, Skeleton
+from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.settings import Shown
@@ -21,6 +22,10 @@ _FLOOR_M = -0.06
 _BOARD_ALONE_M = 0.05  # drawn size of a sensor where there is no hand
 _APART_M = 0.12
 _AXES_M = 0.014
+_GHOSTLY = 0.5
+_ABOVE = np.array([0.0, 0.02, 0.04])
+_MIDDLE = FINGERS.index("middle")
+_BESIDE = {side: np.array([x, 0.0, 0.0]) for side, x in (("right", -0.24), ("left", 0.24))}
 
 _CELLS = {True: ((58, 62, 70), (84, 90, 100)), False: ((206, 210, 216), (176, 182, 190))}
 
@@ -32,6 +37,7 @@ class Scene:
         self._server = server
         self._root = server.scene.add_frame("/hand", show_axes=False)
         self._hand = _HandNodes(server)
+        self._ghost = _GhostNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
         self._dark: bool | None = None
@@ -53,6 +59,10 @@ class Scene:
             case None:
                 self._clear_hand()
                 self._clear_sensors()
+
+    def render_ghost(self, view: GhostView | None) -> None:
+        """Show the hand that shows what is asked for, or none."""
+        self._ghost.render(view)
 
     def say(self, words: str) -> None:
         """Words in the middle of the picture; none: nothing."""
@@ -210,6 +220,69 @@ class _HandNodes:
                 ],
                 dtype=np.uint8,
             )
+
+
+class _GhostNodes:
+    """A pale hand beside the live one; what the step is about keeps its colours."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._skeleton: Skeleton | None = None
+        self._moving: Array | None = None
+        self._sets: tuple[BoneSet, ...] = ()
+        self._bones: dict[str, viser.BatchedMeshHandle] = {}
+        self._label: viser.LabelHandle | None = None
+
+    def render(self, view: GhostView | None) -> None:
+        if view is None:
+            self.clear()
+            return
+        if view.skeleton is not self._skeleton or view.moving is not self._moving:
+            self._build(view)
+        for bones in self._sets:
+            handle = self._bones[bones.mesh]
+            q, t = bones.placed(view.pose)
+            handle.batched_wxyzs, handle.batched_positions = q, t + _BESIDE[view.skeleton.side]
+
+    def clear(self) -> None:
+        for handle in self._bones.values():
+            handle.remove()
+        self._bones.clear()
+        if self._label is not None:
+            self._label.remove()
+            self._label = None
+        self._skeleton, self._moving, self._sets = None, None, ()
+
+    def _build(self, view: GhostView) -> None:
+        self.clear()
+        self._skeleton, self._moving = view.skeleton, view.moving
+        self._sets = bone_sets(view.skeleton)
+        for bones in self._sets:
+            vertices, faces = mesh(bones.mesh, mirrored=view.skeleton.side == "left")
+            tints = [
+                colour if view.moving[segment] else colours.GHOST
+                for segment, colour in zip(bones.segment, bones.colour, strict=True)
+            ]
+            count = len(bones.segment)
+            self._bones[bones.mesh] = self._server.scene.add_batched_meshes_simple(
+                f"/ghost/{bones.mesh}",
+                vertices,
+                faces,
+                batched_wxyzs=np.tile(so3.IDENTITY, (count, 1)),
+                batched_positions=np.zeros((count, 3)),
+                batched_scales=bones.scale,
+                batched_colors=np.array(tints, dtype=np.uint8),
+                batched_opacities=np.where(view.moving[list(bones.segment)], 0.9, _GHOSTLY),
+                cast_shadow=False,
+                lod="off",
+            )
+        self._label = self._server.scene.add_label(
+            "/ghost/words",
+            view.words,
+            position=view.pose.t_world_tip[_MIDDLE] + _BESIDE[view.skeleton.side] + _ABOVE,
+            font_screen_scale=1.1,
+            anchor="bottom-center",
+        )
 
 
 class _BoardNodes:

@@ -17,7 +17,8 @@ from app.panels.page import Page
 from app.scene import Scene
 from app.state import Download, Message, State
 from app.studio import Studio
-from app.views.page import HandView, camera_of, overlay_of, scene_of
+from app.views.course import ghost_view
+from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
 from app.words import _
 
 HOST = "127.0.0.1"
@@ -122,11 +123,13 @@ class Server:
         view = scene_of(state)
         self._scene.furnish(dark=state.settings.theme == "dark")
         self._scene.render(view, state.yaw, state.settings.shown)
+        self._scene.render_ghost(ghost_view(state))
         self._scene.say(overlay_of(state))
         # aimed when asked for, and when the picture is turned otherwise or a hand appears: from
         # the desk all that looks the same
         fixed = state.view is View.DESK
-        aimed = state.aimed, None if fixed else (state.yaw, isinstance(view, HandView))
+        turned = None if fixed else (state.yaw, isinstance(view, HandView))
+        aimed = state.aimed, turned, looks_near(state)
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))

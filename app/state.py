@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from app.guided import Guided, Result, Stand
 from app.live import LiveHistory
 from app.look import View
 from app.review import Review
@@ -72,7 +73,11 @@ class State:
         page_ms: How long the slowest of them takes to answer what it is sent [ms].
         view: Where the picture is taken from; ``aimed`` counts how often it was asked for.
         yaw: Turn of the picture about the vertical; None: to be found anew.
+        stands: Where the courses of the subject and the device stand.
+        guided: The course that is on.
+        result: What came of the last course, until somebody has seen it.
         asking: The page that must say whose hand it is before a take can begin.
+        asking_for: The course that waits for that; empty: a take.
     """
 
     sessions: Path
@@ -90,12 +95,16 @@ class State:
     live: LiveHistory | None = None
     shaking: Shaking | None = None
     review: Review | None = None
+    stands: tuple[Stand, ...] = ()
+    guided: Guided | None = None
+    result: Result | None = None
     work: Work | None = None
     view: View = View.DESK
     aimed: int = 0
     yaw: float | None = None
     # told once, and gone at the next tick
     asking: int | None = None
+    asking_for: str = ""
     messages: tuple[Message, ...] = ()
     downloads: tuple[Download, ...] = ()
     sounds: tuple[Sound, ...] = ()

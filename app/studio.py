@@ -16,6 +16,7 @@ import msgspec
 from app import diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
+from app.calibrating import Calibrator
 from app.jobs import Jobs, Stopped
 from app.keeping import Keeper
 from app.look import LASTING, View, facing
@@ -25,7 +26,7 @@ from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Workshop
+from app.workshop import Computed, Exported, Gathered, Solved, Workshop
 from handstudio.device.capture import Capture
 from handstudio.device.orders import (
     Ask,
@@ -33,6 +34,7 @@ from handstudio.device.orders import (
     Disconnect,
     NotePage,
     Phase,
+    ResetHeading,
     SetHand,
     TakeDone,
 )
@@ -45,7 +47,8 @@ from handstudio.recording import notes as noting
 from handstudio.recording.recovery import recover
 from handstudio.recording.take import Take, open_take
 from handstudio.settings import SettingsStore
-from handstudio.setup import HandModel
+from handstudio.setup import HandModel, Setup
+from handstudio.wizards.course import Next, Redo
 
 _BLINK_MS = 3000
 _ONCE_S = 0.4  # the space bar is a key of the page, and also presses the button clicked last
@@ -65,10 +68,13 @@ class Studio:
     def __post_init__(self) -> None:
         self._keeper = Keeper(self.state.sessions)
         self._taker = Taker(self.capture, self.state.sessions)
+        self._calibrator = Calibrator(self.capture, self._taker, self.state.sessions)
+        self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
         self._now_s = 0.0
-        self._toggled_s = -1.0
+        self._solving = False  # a calibration was ordered
+        self._toggled_s = self._guided_s = -1.0
         self._change()
         kept = [view for view in LASTING if view.value == self.store.settings.camera]
         self.state = replace(self.state, view=kept[0] if kept else View.DESK)
@@ -80,7 +86,8 @@ class Studio:
 
     def tick(self, elapsed_s: float) -> State:
         """Take in all that happened; the state afterwards."""
-        self.state = replace(self.state, messages=(), downloads=(), sounds=(), asking=None)
+        told = replace(self.state, messages=(), downloads=(), sounds=())
+        self.state = replace(told, asking=None, asking_for="")
         while True:
             try:
                 item = self._inbox.get_nowait()
@@ -90,6 +97,7 @@ class Studio:
         self._hear_capture()
         self._finish_work()
         self._take_on(elapsed_s)
+        self._guide_on(elapsed_s)
         idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
         self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
         self.state = replace(self.state, searching=self._looker.busy)
@@ -115,7 +123,9 @@ class Studio:
             match item:
                 case Looked():
                     self._hear_looker(item)
-                case _ if not (self._obey(item) or self._keep(item) or self._prefer(item)):
+                case _ if not any(
+                    each(item) for each in (self._guide, self._obey, self._keep, self._prefer)
+                ):
                     self._move(item)
         except HandstudioError as error:
             self._say(error)
@@ -175,18 +185,20 @@ class Studio:
                 return False
         return True
 
-    def _keep(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+    def _keep(self, intent: intents.Intent) -> bool:  # noqa: PLR0912, PLR0915 - a list
         """The library; False: it is about something else."""
         keeper, review = self._keeper, self.state.review
         match intent:
             case intents.ChooseSubject(code=code):
                 self._change(subject=code)
                 self.capture.send(SetHand(self._hand()))
-            case intents.SaveSubject(then_record=then_record):
+            case intents.SaveSubject(then_record=then_record, then_begin=course):
                 saved = keeper.save_subject(intent)
                 self._take_shelf()
                 self._change(subject=saved.code)
                 self.capture.send(SetHand(self._hand()))
+                if course:
+                    self._guide(intents.BeginCourse(course))
                 if then_record:
                     self._toggle_recording(page=-1)
             case intents.DeleteSubject(code=code, typed=typed):
@@ -311,6 +323,90 @@ class Studio:
         """Which hand a device sits on that does not know it."""
         subject = self.state.subject
         return (subject.side if subject is not None else "") or self.store.settings.side
+
+    # --- guided courses -------------------------------------------------------------------------
+
+    def _guide(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+        """Courses; False: it is about something else."""
+        calibrator, settings = self._calibrator, self.store.settings
+        on, over = calibrator.guided is not None, calibrator.result is not None
+        match intent:
+            case intents.BeginCourse():
+                self._begin_course(intent)
+            case intents.Guide(event=event) if not self._twice():
+                self._hear_all(calibrator.hear(event, settings))
+            case intents.RedoStep(index=index) if on:
+                self._hear_all(calibrator.hear(Redo(index), settings))
+            case intents.RedoStep(index=index):
+                calibrator.redo(index, self.state, settings)
+            case intents.GoOn() if on:
+                self._guide(intents.Guide(Next()))
+            case intents.GoOn() if over and not self._twice():
+                self._guide(intents.CloseResult())
+            case intents.ToggleRecording() | intents.LeaveCourse() if on:
+                calibrator.leave()
+                self._tell(_("The course waits under Calibrate; what was done is kept."))
+            case intents.CloseResult():
+                if calibrator.result is not None and not calibrator.result.solving:
+                    calibrator.result = None
+            case intents.ResetHeading(sensor=sensor):
+                self.capture.send(ResetHeading(sensor))
+                of = sensor or _("all sensors")
+                self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
+            case intents.OpenTake() | intents.ChooseSubject() | intents.DeleteSubject() if on:
+                raise HandstudioError(
+                    "A course of calibration is on.", "Leave it first; it can be gone on with."
+                )
+            case intents.Guide():
+                pass
+            case _:
+                return False
+        self._show_guided()
+        return True
+
+    def _twice(self) -> bool:
+        """Whether this is the space bar again, as the click of the button that has the focus."""
+        twice = self._now_s - self._guided_s < _ONCE_S
+        self._guided_s = self._guided_s if twice else self._now_s
+        return twice
+
+    def _begin_course(self, order: intents.BeginCourse) -> None:
+        if self.state.newest.ready and self.state.subject is None:
+            self.state = replace(self.state, asking=order.page, asking_for=order.name)
+            return
+        if self._calibrator.guided is not None:
+            return
+        self._calibrator.begin(order.name, self.state, self.store.settings, anew=order.anew)
+        self.state = replace(self.state, review=None, yaw=None, aimed=self.state.aimed + 1)
+
+    def _guide_on(self, elapsed_s: float) -> None:
+        calibrator = self._calibrator
+        try:
+            self._hear_all(calibrator.tick(elapsed_s, self.state))
+        except HandstudioError as error:
+            self._sound(Sound.ALARM)
+            self._say(error)
+        takes = calibrator.to_solve()
+        if takes and not self._solving:
+            self._solving = True
+            self._workshop.calibrate(takes, self.state.sessions)
+        self._show_guided()
+
+    def _show_guided(self) -> None:
+        calibrator, state = self._calibrator, self.state
+        guided, result = calibrator.guided, calibrator.result
+        if (guided is None) != (state.guided is None):
+            state = replace(state, aimed=state.aimed + 1)
+        code = state.subject.code if state.subject is not None else ""
+        now = code, state.newest.setup, guided is not None or result is not None
+        if now != self._stands_for:
+            self._stands_for = now
+            state = replace(state, stands=calibrator.stands(state))
+        self.state = replace(state, guided=guided, result=result)
+
+    def _hear_all(self, sounds: list[Sound]) -> None:
+        for sound in sounds:
+            self._sound(sound)
 
     # --- recording ------------------------------------------------------------------------------
 
@@ -443,12 +539,15 @@ class Studio:
             if isinstance(report, TakeDone):
                 self._take_done(report.path)
             else:
+                self._calibrator.take_failed(report)
                 self._sound(Sound.ALARM)
                 self._say(report)
                 self.refresh_takes()
 
     def _take_done(self, path: Path) -> None:
         self.refresh_takes()
+        if self._calibrator.take_done(path):
+            return
         self._tell(
             _("Recorded {name}. Replay it below, export it under Review.").format(name=path.stem)
         )
@@ -468,6 +567,9 @@ class Studio:
                     self._send_file(download)
                 case Gathered(download=download):
                     self._send_file(download)
+                case Solved(calibrated=calibrated):
+                    self._solving = False
+                    self._calibrator.solved(calibrated)
                 case Stopped():
                     self._tell(" ".join(words.in_words(outcome)))
                 case HandstudioError():

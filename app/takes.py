@@ -44,6 +44,17 @@ class Taker:
             raise _full(self.sessions, self.disk)
         self.countdown = Countdown(settings.countdown_s)
 
+    def begin_at_once(self, settings: Settings, name: str) -> None:
+        """Begin a take of this name without a count.
+
+        Raises:
+            TakeError: the disk has no room for one, or it cannot be called so.
+        """
+        if self.disk is not None and self.disk.full:
+            raise _full(self.sessions, self.disk)
+        self.countdown = None
+        self._start(settings, name)
+
     def cancel(self) -> None:
         """No take after all."""
         self.countdown = None
@@ -104,14 +115,12 @@ class Taker:
             begun = before.left_s == settings.countdown_s
             return [Sound.TICK] if begun or now.shown != before.shown else []
         self.countdown = None
-        self._start(settings)
+        self._start(settings, settings.take_name)
         return [Sound.START]
 
-    def _start(self, settings: Settings) -> None:
+    def _start(self, settings: Settings, name: str) -> None:
         now = datetime.now().astimezone()
-        path = library.new_take_path(
-            self.sessions, settings.subject, settings.take_name, now, settings.visit
-        )
+        path = library.new_take_path(self.sessions, settings.subject, name, now, settings.visit)
         self.marks, self._warned = 0, False
         self.capture.send(StartTake(path, settings.subject))
 

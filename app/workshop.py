@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 from app.jobs import Jobs
 from app.state import Download, Work
 from app.words import _
+from handstudio.calibrate import Calibrated
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window
 from handstudio.recording.take import Take
@@ -37,7 +38,14 @@ class Gathered:
     download: Download
 
 
-Outcome = Computed | Exported | Gathered
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """A calibration was computed, or not, and why not."""
+
+    calibrated: Calibrated | HandstudioError
+
+
+Outcome = Computed | Exported | Gathered | Solved
 
 
 @dataclass
@@ -45,6 +53,7 @@ class _Pending:
     future: Future[Any]
     use: Callable[[Any], Outcome]
     words: str
+    fail: Callable[[HandstudioError], Outcome | HandstudioError] = lambda error: error
 
 
 @dataclass
@@ -88,6 +97,12 @@ class Workshop:
         words = _("Gathering diagnostics")
         self._pending.append(_Pending(self._aside.submit(make), use, words))
 
+    def calibrate(self, paths: Sequence[Path], sessions: Path) -> None:
+        """The calibration of a subject."""
+        future = self.jobs.calibrate(paths, sessions)
+        words = _("Computing the calibration")
+        self._pending.append(_Pending(future, Solved, words, Solved))
+
     def cancel(self) -> None:
         """Stop what is on."""
         self.jobs.cancel()
@@ -99,11 +114,12 @@ class Workshop:
             try:
                 yield one.use(one.future.result())
             except HandstudioError as error:
-                yield error
+                yield one.fail(error)
             except Exception as error:  # the job's process may have been killed
-                yield HandstudioError(
+                failed = HandstudioError(
                     "{work}: {reason}",
                     "Try again; if it fails again, restart the studio.",
                     work=one.words,
                     reason=repr(error),
                 )
+                yield one.fail(failed)

@@ -16,9 +16,11 @@ from typing import Annotated, Any, Literal
 import msgspec
 import tyro
 
+from handstudio.commands import calibration as calibration_commands
 from handstudio.commands import keeping
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
+from handstudio.commands.noise import noise
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
@@ -166,6 +168,8 @@ def process(
     *,
     filter: str | None = None,
     from_start: bool = False,
+    calibration: str | None = None,
+    sensors: str | None = None,
     csv: bool = False,
     json: Json = False,
 ) -> int:
@@ -175,6 +179,8 @@ def process(
         takes: The takes.
         filter: Another filter than the take was recorded with (vqf, raw, filter1).
         from_start: Ignore what the studio knew before the first byte of the take.
+        calibration: File of another subject calibration than the take carries, or none.
+        sensors: File of another calibration of the sensors than the take carries, or none.
         csv: Also write the joint angles (orientations, where there is no hand) beside each take.
         json: Print JSON for a program instead of words.
     """
@@ -183,7 +189,7 @@ def process(
     results = []
     for path in takes:
         take = open_take(path)
-        setup = take.header.setup
+        setup = calibration_commands.chosen(take.header.setup, calibration, sensors)
         if filter is not None:
             setup = msgspec.structs.replace(setup, filter=filter_named(filter))
         with progress(path.name, quiet=json) as share:
@@ -209,6 +215,8 @@ def export(
     to: Path | None = None,
     start_s: float = 0.0,
     end_s: float | None = None,
+    calibration: str | None = None,
+    sensors: str | None = None,
 ) -> int:
     """Write joint angles, orientations or positions as CSV with a sidecar JSON.
 
@@ -218,11 +226,13 @@ def export(
         to: The file to write; beside the take unless given.
         start_s: Begin of the window, seconds from the take's first instant.
         end_s: End of the window; the end of the take unless given.
+        calibration: File of another subject calibration than the take carries, or none.
+        sensors: File of another calibration of the sensors than the take carries, or none.
     """
     opened = open_take(take)
-    setup = opened.header.setup
+    setup = calibration_commands.chosen(opened.header.setup, calibration, sensors)
     with progress(take.name) as share:
-        motion = process_take(opened, progress=share)
+        motion = process_take(opened, setup, progress=share)
     target = to or take.with_suffix(f".{content}.csv")
     window = Window(start_s, end_s)
     export_csv(opened, setup, motion, target, content=content, window=window)
@@ -317,6 +327,11 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "recover": recover,
     "simulate": virtual_commands.simulate,
     "motions": virtual_commands.motions,
+    "calibrate": calibration_commands.calibrate,
+    "calibrations": calibration_commands.calibrations,
+    "mirror": calibration_commands.mirror,
+    "calibrate-sensors": calibration_commands.calibrate_sensors,
+    "noise": noise,
     "takes": keeping.takes,
     "rename": keeping.rename,
     "bin": keeping.bin,

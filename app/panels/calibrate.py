@@ -1,20 +1,180 @@
-"""Calibrate: what the model of this hand rests on now, what is missing, how long it takes."""
+"""Calibrate: which courses there are and where they stand, the sheet of a step, heading."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import viser
 
-from app.panels.base import put
+from app import intents
+from app.guided import Stand
+from app.panels.base import QUIET, Send, page_of, put, typed
 from app.state import State
 from app.views import calibration as calibration_view
+from app.views import course as view
+from app.views.steps import course_name
+from app.words import _
+from handstudio.calibration.course import COURSES
+from handstudio.device.orders import Phase
+from handstudio.wizards.course import GoByItself
+
+_SHEET_PX = (660.0, 392.0)
+_RESULT_PX = (660.0, 640.0)
 
 
 class CalibratePanel:
-    """The steps towards a hand that can be trusted, each with where it stands."""
+    """The courses towards a hand that can be trusted; while one is on, its steps."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._list = gui.add_html("", visible=False)
+        self._steps: dict[str, int] = {}
+        self._index = -1
+        self._step = gui.add_dropdown(_("Step"), ("",), visible=False)
+        self._redo = gui.add_button(
+            _("Do this step again"), icon=viser.Icon.REPEAT, color=QUIET, visible=False
+        )
+        self._by_itself = gui.add_checkbox(
+            _("Go on by itself"),
+            initial_value=False,
+            hint=_("Steps begin and follow one another without the space bar"),
+            visible=False,
+        )
         self._sheet = gui.add_html("")
+        names = sorted(COURSES, key=_ORDER.index) if set(COURSES) <= set(_ORDER) else list(COURSES)
+        self._rows = {name: _CourseRow(gui, send, name) for name in names}
+        with gui.add_folder(_("Heading"), expand_by_default=False):
+            self._all = _("All sensors")
+            self._which = gui.add_dropdown(_("Sensor"), (self._all,))
+            self._reset = gui.add_button(
+                _("Take the heading anew"),
+                icon=viser.Icon.COMPASS,
+                color=QUIET,
+                hint=_("As the hand lies now, forearm ahead; key: H, all sensors"),
+            )
+        self._redo.on_click(
+            lambda _event: send(intents.RedoStep(self._steps.get(self._step.value, -1)))
+        )
+        self._by_itself.on_update(typed(lambda on: send(intents.Guide(GoByItself(on)))))
+        self._reset.on_click(lambda _event: send(intents.ResetHeading(self._sensor())))
 
     def render(self, state: State) -> None:
-        """Show where each step stands."""
-        put(self._sheet, content=calibration_view.as_html(calibration_view.steps_of(state)))
+        """Show where each course stands, or each step of the one that is on."""
+        guided = state.guided
+        on = guided is not None
+        for handle in (self._list, self._step, self._redo, self._by_itself):
+            put(handle, visible=on)
+        put(self._sheet, visible=not on)
+        if guided is None:
+            steps = calibration_view.steps_of(state)
+            put(self._sheet, content=calibration_view.as_html(steps))
+        else:
+            put(self._list, content=view.list_of(guided.course))
+            put(self._by_itself, value=guided.course.by_itself)
+            self._render_steps(view.step_choices(guided.course), guided.course.index)
+        stands = {stand.name: stand for stand in view.stands_of(state)}
+        for name, row in self._rows.items():
+            row.render(None if on else stands.get(name), ready=_ready(state))
+        setup = state.newest.setup
+        sensors = (self._all, *(setup.layout.names if setup is not None else ()))
+        put(self._which, options=sensors)
+        put(self._reset, disabled=state.newest.phase is not Phase.STREAMING)
+
+    def _render_steps(self, choices: dict[str, int], index: int) -> None:
+        if choices == self._steps:
+            return
+        chosen = self._steps.get(self._step.value, index)
+        self._steps = choices
+        self._step.options = tuple(choices)
+        put(self._step, value=list(choices)[chosen if index == self._index else index])
+        self._index = index
+
+    def _sensor(self) -> str | None:
+        return None if self._which.value == self._all else self._which.value
+
+
+_ORDER = ("hand", "check", "quick_start", "sensors", "noise")
+
+
+class _CourseRow:
+    """One course: what it is for, and the buttons to begin it or go on."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send, name: str) -> None:
+        self._name = name
+        self._words = gui.add_html("")
+        self._begin = gui.add_button(course_name(name), icon=viser.Icon.PLAYER_PLAY, color=QUIET)
+        self._anew = gui.add_button(_("Begin anew"), color=QUIET, visible=False)
+        self._begin.on_click(self._beginning(send, anew=False))
+        self._anew.on_click(self._beginning(send, anew=True))
+
+    def render(self, stand: Stand | None, *, ready: bool) -> None:
+        """Show where it stands; None: it is not to be begun now."""
+        for handle in (self._words, self._begin):
+            put(handle, visible=stand is not None)
+        left = stand is not None and stand.settled > 0
+        put(self._anew, visible=left, disabled=not ready)
+        if stand is not None:
+            put(self._words, content=view.stand_of(stand))
+            words = _("Go on: {course}") if left else _("Begin: {course}")
+            put(
+                self._begin,
+                label=words.format(course=course_name(self._name)),
+                disabled=not ready,
+            )
+
+    def _beginning(self, send: Send, *, anew: bool) -> Callable[[Any], None]:
+        return lambda event: send(intents.BeginCourse(self._name, anew, page_of(event)))
+
+
+class CoursePanel:
+    """The sheet that is read from two metres away: a step of the course, or what came of it."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._send = send
+        self._panel = gui.add_panel(visible=False)
+        with self._panel.add_tab(_("Calibrate"), viser.Icon.HAND_CLICK):
+            self._sheet = gui.add_html("")
+            self._first = gui.add_button(" ", hint=_("Key: space"))
+            self._others = gui.add_button_group(" ", (" ",))
+        self._shown: view.Sheet = view.Sheet("")
+        self._large = False
+        self._place(large=False)
+        self._first.on_click(lambda _event: self._say_first())
+        self._others.on_click(lambda event: self._say_other(event.target.value))
+
+    def render(self, state: State) -> None:
+        """Show the step, or what came of the course."""
+        sheet = view.sheet_of(state)
+        put(self._panel, visible=sheet is not None)
+        if sheet is None:
+            return
+        self._shown = sheet
+        large = state.result is not None and state.result.calibrated is not None
+        if large != self._large:
+            self._large = large
+            self._place(large=large)
+        put(self._sheet, content=sheet.content)
+        put(self._first, visible=sheet.first is not None)
+        if sheet.first is not None:
+            put(self._first, label=sheet.first[0])
+        labels = tuple(label for label, _intent in sheet.others)
+        put(self._others, visible=bool(labels))
+        if labels and tuple(self._others.options) != labels:
+            self._others.options = labels
+
+    def _place(self, *, large: bool) -> None:
+        width, height = _RESULT_PX if large else _SHEET_PX
+        self._panel.float(x=16.0, y=-16.0, width=width, height=height)
+
+    def _say_first(self) -> None:
+        if self._shown.first is not None:
+            self._send(self._shown.first[1])
+
+    def _say_other(self, label: str) -> None:
+        for words, intent in self._shown.others:
+            if words == label:
+                self._send(intent)
+
+
+def _ready(state: State) -> bool:
+    return state.newest.phase is Phase.STREAMING and state.newest.recorder is None

@@ -11,7 +11,7 @@ from viser._messages import HotkeyKey
 from app import intents, sounds
 from app.look import View
 from app.panels.base import QUIET, Send, page_of, put
-from app.panels.calibrate import CalibratePanel
+from app.panels.calibrate import CalibratePanel, CoursePanel
 from app.panels.device import DevicePanel
 from app.panels.library import LibraryPanel
 from app.panels.looks import LooksPanel
@@ -53,7 +53,7 @@ class Page:
         with tabs.add_tab(_("Device")):
             self._device = DevicePanel(gui, send, state)
         with tabs.add_tab(_("Calibrate")):
-            self._calibrate = CalibratePanel(gui)
+            self._calibrate = CalibratePanel(gui, send)
         with tabs.add_tab(_("Record")):
             self._record = RecordPanel(gui, send, state)
         with tabs.add_tab(_("Review")):
@@ -64,6 +64,7 @@ class Page:
         self._plots: dict[int, PlotsPanel] = {}
         self._transport = TransportPanel(gui, send)
         self._recording = RecordingPanel(gui, send)
+        self._course = CoursePanel(gui, send)
         self._looks = LooksPanel(gui, send, state)
         self._tick = 0
         self._silence_at = 0
@@ -77,6 +78,7 @@ class Page:
         if self._tick % PLOTS_EVERY == 0:
             self._transport.render(state)
             self._recording.render(state)
+            self._course.render(state)
             self._render_plots(state)
         if self._tick % TEXTS_EVERY == 0 or state.messages:
             self._render_texts(state)
@@ -140,7 +142,8 @@ class Page:
         clients = self._server.get_clients()
         asked = clients.get(state.asking) or next(iter(clients.values()), None)
         if asked is not None:
-            ask_subject(asked, self._send, state, None, then_record=True)
+            course = state.asking_for
+            ask_subject(asked, self._send, state, None, then_record=not course, then_begin=course)
 
 
 _CAPTION = "font-size:.8rem;padding:0 .75em .5em;opacity:.75"
@@ -174,6 +177,8 @@ def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
         (_("Show or hide sensors"), "S", intents.ToggleShown("sensors")),
         (_("Show or hide sensor axes"), "X", intents.ToggleShown("axes")),
         (_("Show or hide sensor names"), "N", intents.ToggleShown("labels")),
+        (_("Take the heading of all sensors anew"), "H", intents.ResetHeading()),
+        (_("Leave the course of calibration"), None, intents.LeaveCourse()),
         (_("Look for devices"), None, intents.FindDevices()),
         (_("Disconnect"), None, intents.DisconnectDevice()),
         (_("Light page"), None, intents.SetTheme(dark=False)),

@@ -136,6 +136,7 @@ def ask_subject(
     subject: Subject | None,
     *,
     then_record: bool,
+    then_begin: str = "",
 ) -> None:
     """A sheet for one page: whose hand it is."""
     gui = client.gui
@@ -158,7 +159,11 @@ def ask_subject(
             hint=_("From the wrist crease to the tip of the middle finger"),
         )
         save = gui.add_button(
-            _("Save and record") if then_record else _("Save"),
+            _("Save and record")
+            if then_record
+            else _("Save and begin")
+            if then_begin
+            else _("Save"),
             icon=viser.Icon.CHECK,
             color=RED if then_record else None,
         )
@@ -166,7 +171,7 @@ def ask_subject(
 
     def saved(_event: object) -> None:
         chosen = next(name for name, words in sides.items() if words == side.value)
-        send(intents.SaveSubject(code.value, chosen, float(length.value), then_record))
+        send(intents.SaveSubject(code.value, chosen, float(length.value), then_record, then_begin))
         modal.close()
 
     save.on_click(saved)

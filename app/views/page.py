@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from app.channels import Plot, plots_of
 from app.live import SPAN_S
-from app.look import Camera, camera_for
+from app.look import Camera, View, camera_for, course_camera
 from app.state import State
 from app.views.health import worst_of
 from app.words import _, in_words
@@ -129,8 +129,18 @@ def overlay_of(state: State) -> str:
     return words[state.newest.phase] if state.review is None else ""
 
 
+def looks_near(state: State) -> bool:
+    """Whether the step that is on leaves the arm about where it is."""
+    if state.guided is None:
+        return False
+    step = state.guided.course.step
+    return step.kind not in ("turn", "tumble") and not step.joint.startswith(("elbow", "wrist"))
+
+
 def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
     """Where the picture is taken from."""
+    if state.guided is not None and state.view is View.DESK:
+        return course_camera(state.guided.course.layout.side, near=looks_near(state))
     if isinstance(view, HandView):
         return camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
     return camera_for(state.view, None, None, 0.0)

@@ -61,7 +61,12 @@ def clock_of(seconds: float) -> str:
 
 
 def sheet_of(state: State) -> str:
-    """What is read from two metres away: the count before a take, or its time; else nothing."""
+    """What is read from two metres away: the count before a take, or its time; else nothing.
+
+    A course of calibration has a sheet of its own.
+    """
+    if state.guided is not None:
+        return ""
     if state.countdown is not None:
         return _sheet(
             str(state.countdown.shown),

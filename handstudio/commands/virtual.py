@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from handstudio.commands.arguments import Json
+from handstudio.errors import SetupError
 from handstudio.hand.skeleton import HandSide
 from handstudio.recording import library
 from handstudio.recording.material import material
@@ -69,6 +71,7 @@ def simulate(
     seconds: float | None = None,
     rate: int = 100,
     name: str = "",
+    start: str = "",
     out_folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None,
 ) -> int:
     """Write a take of a virtual subject, its labels, and the truth beside it.
@@ -84,9 +87,11 @@ def simulate(
         seconds: How long; as long as the motion unless given.
         rate: Samples a second.
         name: Of the take; as the motion unless given.
+        start: When it begins, such as 2026-03-04T12:30:00, UTC; now unless given. The same seed,
+            start and name give the same file to the last bit.
         out_folder: Folder of the takes (default: as the studio's).
     """
-    strengths = parse(imperfections)
+    strengths, begin = parse(imperfections), _begin(start)
     with progress("simulating", quiet=False) as share:
         path = simulate_take(
             library.sessions_folder(out_folder),
@@ -94,7 +99,26 @@ def simulate(
             seconds=seconds,
             rate_hz=rate,
             name=name,
+            start=begin,
             progress=share,
         )
     out.print(str(path))
     return 0
+
+
+def _begin(start: str) -> datetime | None:
+    if not start:
+        return None
+    try:
+        time = datetime.fromisoformat(start)
+        time = time.replace(tzinfo=UTC) if time.tzinfo is None else time.astimezone(UTC)
+        since_1970 = time.timestamp()
+    except (ValueError, OverflowError):
+        since_1970 = -1.0
+    if since_1970 < 0.0:
+        raise SetupError(
+            "{start}: no time a take can begin.",
+            "Give day and time, 1970 or later, such as 2026-03-04T12:30:00.",
+            start=start,
+        )
+    return time

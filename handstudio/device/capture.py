@@ -12,6 +12,7 @@ import queue
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -31,7 +32,9 @@ from handstudio.device.orders import (
     Order,
     Phase,
     Report,
+    ResetHeading,
     SetHand,
+    ShareSamples,
     StartTake,
     StopTake,
     TakeDone,
@@ -51,7 +54,7 @@ from handstudio.protocol.packets import (
 )
 from handstudio.recording.header import Header
 from handstudio.recording.take import FirstState, pack_first_state
-from handstudio.samples import Ranges
+from handstudio.samples import Event, ImuSamples, Ranges
 from handstudio.setup import HandModel, Setup, for_device
 from handstudio.stream import EventStream
 
@@ -61,7 +64,7 @@ SILENCE_S = 0.5  # without motion for so long a streaming device counts as lost
 REOPEN_S = 2.0  # a line without a byte is opened anew after this
 RETRY_S = 0.25  # between attempts to reach a lost device
 INTRODUCTION_S = 4.0  # a device that has not described itself by then is not one of ours
-HISTORY = 2000  # motions kept for `drain`
+HISTORY = 2000  # motions kept for `drain`, and runs of samples for `drain_samples`
 _OUR_OWN = (Command.DESCRIBE, Command.START, Command.STOP)  # asked by us, not by a person
 
 
@@ -81,6 +84,7 @@ class Capture:
         self.newest = Newest()
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
         self._history: deque[Motion] = deque(maxlen=HISTORY)
+        self._samples: deque[ImuSamples] | None = None  # only while somebody wants them
         self._reports: deque[Report] = deque(maxlen=100)
         self._closing: list[Recorder] = []
         self._wanted: _Wanted | None = None
@@ -103,6 +107,14 @@ class Capture:
     def drain(self) -> list[Motion]:
         """The motions since the last call, oldest first; for one reader."""
         return _emptied(self._history)
+
+    def drain_samples(self) -> list[ImuSamples]:
+        """The samples since the last call, oldest first; for one reader, who asked for them.
+
+        Their time axis is that of the motions: it goes on where a device began anew.
+        """
+        samples = self._samples
+        return [] if samples is None else _emptied(samples)
 
     def reports(self) -> list[Report]:
         """What happened since the last call, oldest first; for one reader."""
@@ -165,6 +177,10 @@ class Capture:
                 self._health.note_page(ms)
             case Ask():
                 self._pass_on(order)
+            case ShareSamples(on=on):
+                self._samples = deque(maxlen=HISTORY) if on else None
+            case ResetHeading():
+                pass
 
     def _let_go(self) -> None:
         self._stop_take()
@@ -289,6 +305,7 @@ class Capture:
             motion, self._state = pipeline.run(self.newest.setup, self._state, events)
             if len(motion):
                 self._publish(motion, arrival_ns, line)
+                self._share(motion, events)
         self._health.note(packets, events, arrival_ns)  # after the pose: nobody waits for it
         for packet in packets:
             self._heed(packet, line)
@@ -307,6 +324,16 @@ class Capture:
             findings=self._health.findings,
             problem=None,
         )
+
+    def _share(self, motion: Motion, events: Sequence[Event]) -> None:
+        """Samples for whoever wants them, on the time axis of the motion."""
+        runs = [event for event in events if isinstance(event, ImuSamples)]
+        if self._samples is None or sum(map(len, runs)) != len(motion):
+            return
+        at = 0
+        for run in runs:
+            self._samples.append(replace(run, time_us=motion.time_us[at : at + len(run)]))
+            at += len(run)
 
     def _heed(self, packet: Packet, line: Line) -> None:
         if line is not self._line:

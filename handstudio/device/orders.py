@@ -76,7 +76,31 @@ class NotePage:
     ms: float
 
 
-Order: TypeAlias = Connect | Disconnect | SetHand | StartTake | StopTake | Ask | NotePage
+@dataclass(frozen=True, slots=True)
+class ShareSamples:
+    """Whether somebody wants the samples as they come, see `Capture.drain_samples`."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ResetHeading:
+    """Take the heading anew, of one sensor by its name or, with None, of all."""
+
+    sensor: str | None
+
+
+Order: TypeAlias = (
+    Connect
+    | Disconnect
+    | SetHand
+    | StartTake
+    | StopTake
+    | Ask
+    | NotePage
+    | ShareSamples
+    | ResetHeading
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,12 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
         "loss_percent": _loss_percent(take, health),
         "findings": [_told(trouble, setup) for trouble in health.troubles],
         "calibration": setup.calibration,
+        "calibration_made": _subject_made(setup),
+        "calibration_residuals": _joint_residuals(setup),
         "zero": setup.zero,
+        "zero_source": _zero_source(setup),
+        "sensor_calibration": _sensors_made(setup),
+        "heading_alignment_deg": _headings(setup),
         "convention": CONVENTION,
         "filter": msgspec.to_builtins(setup.filter),
         "hand_length_m": setup.hand.hand_length_m,
@@ -57,6 +62,74 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
     if content == "positions":
         fields["origin"] = "the elbow, assumed still: its place cannot be observed"
     return msgspec.json.format(msgspec.json.encode(fields))
+
+
+def _subject_made(setup: Setup) -> dict[str, Any] | None:
+    """Where the subject calibration is from; None: proportions only."""
+    subject = setup.subject
+    if subject is None:
+        return None
+    return {
+        "id": subject.id,
+        "made_utc": subject.made_utc,
+        "software": subject.software,
+        "device": subject.device,
+        "takes": dict(subject.takes),
+        "mirrored_from": subject.mirrored_from or None,
+    }
+
+
+def _joint_residuals(setup: Setup) -> list[dict[str, Any]] | None:
+    """What was left of the accelerations that joint centres were found by."""
+    if setup.subject is None:
+        return None
+    return [
+        {
+            "joint": centre.joint,
+            "sensor": centre.sensor,
+            "residual_m_s2": centre.residual,
+            "place_sd_mm": [round(1e3 * sd, 3) for sd in centre.sd_m],
+        }
+        for centre in setup.subject.centres
+    ]
+
+
+def _zero_source(setup: Setup) -> str:
+    """What says where the zero of the angles is."""
+    subject = setup.subject
+    if subject is None:
+        return "maker"
+    return "mirror of the other hand" if subject.mirrored_from else "calibration"
+
+
+def _sensors_made(setup: Setup) -> dict[str, Any] | None:
+    """Where the sensors' corrections are from; None: sensors as shipped."""
+    sensors = setup.sensors
+    if sensors is None:
+        return None
+    return {
+        "device": sensors.device,
+        "made_utc": sensors.made_utc,
+        "software": sensors.software,
+        "takes": {source.take: source.sha256 for source in sensors.source},
+        "sensors": [sensor.name for sensor in sensors.sensors],
+        "residuals": {
+            sensor.name: {
+                "acc_m_s2": sensor.residuals.acc,
+                "gyr_deg": float(np.rad2deg(sensor.residuals.gyr)),
+                "mag_percent": None if sensor.residuals.mag is None else 100 * sensor.residuals.mag,
+            }
+            for sensor in sensors.sensors
+        },
+    }
+
+
+def _headings(setup: Setup) -> dict[str, float] | None:
+    """By how much each sensor was turned about the vertical; None: not at all."""
+    if not setup.heading_rad:
+        return None
+    degrees = np.rad2deg(setup.heading_rad).tolist()
+    return dict(zip(setup.layout.names, degrees, strict=True))
 
 
 def _loss_percent(take: Take, health: TakeHealth) -> float | None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from handstudio.errors import TakeError
 from handstudio.recording import bin as bin_
 from handstudio.recording.held import is_held
-from handstudio.recording.library import Entry, entries, folders, take_files
+from handstudio.recording.library import Entry, entries, folders, take_files, visits
 from handstudio.recording.moves import settle
 from handstudio.recording.naming import file_name, is_unfinished
 from handstudio.recording.subjects import existing
@@ -67,7 +67,7 @@ def what_deleting_removes(sessions: Path, code: str) -> Removal:
         code,
         len(own),
         len(binned),
-        len(folders(sessions / code)),
+        len(visits(sessions / code)),
         sum(_seconds(entry) for entry in (*own, *binned)) / 60.0,
         sum(file.lstat().st_size for file in files),
         (*strangers, *links),
@@ -75,7 +75,7 @@ def what_deleting_removes(sessions: Path, code: str) -> Removal:
 
 
 def delete_subject(sessions: Path, code: str, typed: str) -> Removal:
-    """Remove a subject: takes, notes, motion, exports, and what is in the bin; what was removed.
+    """Remove a subject with takes, calibrations and all in the bin; says what was removed.
 
     Files are removed, not overwritten: copies made elsewhere, and what an undelete tool may find
     on the disk, are beyond this. A second call goes on where a first one failed.

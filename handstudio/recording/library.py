@@ -34,6 +34,9 @@ Stamp: TypeAlias = tuple[int, int, int]
 
 _NO_FILE: Stamp = (0, 0, 0)
 
+CALIBRATIONS = "calibrations"
+"""Folder of a subject that is no visit: every calibration there ever was."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -135,6 +138,11 @@ def folders(parent: Path) -> list[Path]:
     return sorted(path for path in found if not path.name.startswith("."))
 
 
+def visits(subject: Path) -> list[Path]:
+    """The folders of a subject's visits, by name."""
+    return [folder for folder in folders(subject) if not same_name(folder.name, CALIBRATIONS)]
+
+
 def subject_folder(sessions: Path, code: str) -> Path:
     """Where a subject's takes lie: the folder there is, also if it is written ``s01`` for ``S01``.
 
@@ -155,10 +163,17 @@ def new_take_path(sessions: Path, subject: str, name: str, now: datetime, visit:
         visit: Name of the visit, where it is not the day.
 
     Raises:
-        TakeError: subject, visit or name leave nothing to call a file.
+        TakeError: subject, visit or name leave nothing to call a file, or no visit can be called
+            so.
     """
     home = subject_folder(sessions, subject)
     called = file_name(visit, "visit") if visit.strip() else f"{now:%Y-%m-%d}"
+    if same_name(called, CALIBRATIONS):
+        raise TakeError(
+            "No visit can be called {name}: calibrations are kept there.",
+            "Give the visit another name.",
+            name=called,
+        )
     return free_path(_folder_called(home, called) / f"{file_name(name, 'take')}{TAKE}")
 
 

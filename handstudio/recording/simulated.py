@@ -99,6 +99,7 @@ def simulate(
     rate_hz: int = 100,
     code: str = "",
     name: str = "",
+    start: datetime | None = None,
     health: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Path:
@@ -111,6 +112,8 @@ def simulate(
         rate_hz: Samples a second.
         code: Of the subject; ``virtual-NUMBER`` unless told.
         name: Of the take; as the motion unless told.
+        start: When it begins; now unless told. The same rehearsal, start and name give the same
+            file to the last bit.
         health: Keep the health of stream and sensors with the take, at half the speed; unless told
             it is computed when somebody asks for it.
         progress: Told the share that is done.
@@ -125,7 +128,7 @@ def simulate(
     _refuse(seconds, rate_hz)
     subject = rehearsed.subject
     told = described(subject, rehearsed.seed, rate_hz, rehearsed.seed + 1)
-    start = datetime.now(UTC)
+    start = (start or datetime.now(UTC)).astimezone(UTC)
     code = code or f"virtual-{subject.number}"
     path = new_take_path(sessions, code, name or rehearsed.motion, start)
     setup = for_device(told, "handstudio-1", HandModel(hand_length_m=subject.hand_length_m))
@@ -241,6 +244,7 @@ def _write(
         if chunk:
             arrival_ns = began_ns + min(now_us, end_us) * 1000
             writer.write(arrival_ns, chunk)
+            writer.flush()  # by itself it also does by the clock, and then files would differ
             if heard is not None:
                 heard.hear(arrival_ns, chunk)
         progress(min(now_us / end_us, 1.0))

@@ -14,7 +14,7 @@ import msgspec
 
 from handstudio.errors import HandstudioError, TakeError
 from handstudio.recording.atomic import BACKUP, write_json
-from handstudio.recording.library import folders
+from handstudio.recording.library import folders, visits
 from handstudio.recording.naming import file_name, same_name
 
 FILE = "subject.json"
@@ -123,11 +123,11 @@ def _valid(code: str) -> str:
 
 
 def _known(sessions: Path, folder: Path) -> Known:
-    visits = tuple(visit.name for visit in folders(folder))
+    names = tuple(visit.name for visit in visits(folder))
     try:
-        return Known(_read(folder), visits)
+        return Known(_read(folder), names)
     except TakeError as error:
-        return Known(Subject(folder.name), visits, error)
+        return Known(Subject(folder.name), names, error)
 
 
 def _read(folder: Path) -> Subject:

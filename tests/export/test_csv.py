@@ -14,6 +14,8 @@ import pyarrow.csv
 import pytest
 
 from handstudio import __version__
+from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors, Source
+from handstudio.calibration.subject import Centre, SubjectCalibration
 from handstudio.errors import TakeError
 from handstudio.export import csv as csv_module
 from handstudio.export.csv import Content, Window, export_csv
@@ -28,7 +30,7 @@ from handstudio.recording.header import Header, Summary
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
-from handstudio.setup import HandModel, Setup
+from handstudio.setup import HandModel, Setup, calibrated
 
 CONTENTS: tuple[Content, ...] = ("angles", "orientations", "positions")
 
@@ -253,6 +255,10 @@ def test_every_export_says_where_it_is_from(recorded, motion, tmp_path, content)
     assert told["findings"] == []
     assert told["calibration"] == header.setup.calibration
     assert told["zero"] == header.setup.zero
+    assert told["zero_source"] == "maker"
+    for key in ("made", "residuals"):
+        assert told[f"calibration_{key}"] is None
+    assert told["sensor_calibration"] is told["heading_alignment_deg"] is None
     assert "flexion (about x), deviation (about z), rotation (about y)" in told["convention"]
     assert told["filter"]["type"] == "vqf"
     assert told["software"] == f"handstudio {__version__}"
@@ -263,6 +269,42 @@ def test_every_export_says_where_it_is_from(recorded, motion, tmp_path, content)
         0.002
     )
     assert told["device"]["serial_number"] == "VG-1"
+
+
+def test_what_was_calibrated_goes_along(recorded, motion, tmp_path):
+    layout = recorded.header.setup.layout
+    centre = Centre(
+        "index_pip", "SN16", (0.0, 0.03, 0.0), (1e-3,) * 3, (1.0, 0.0, 0.0), 0.2, (60.0, 3.0), 7.0
+    )
+    subject = SubjectCalibration(
+        *("S01-3", "2026-03-04T12:30:05Z", "handstudio 9", "S01", "left", 0.18, 3, "VG-1", (), ()),
+        centres=(centre,),
+        takes=(("course", "ab" * 32),),
+    )
+    zero = (0.0, 0.0, 0.0)
+    errors = SensorErrors("SN1", UNITY, zero, UNITY, zero, Residuals(0.1, np.deg2rad(0.3)), 12)
+    sensors = DeviceCalibration(
+        *("VG-1", "2026-03-03T12:30:05Z", "handstudio 8", (Source("tumble", "cd" * 32),), (errors,))
+    )
+    setup = calibrated(recorded.header.setup, subject=subject, sensors=sensors)
+    setup = msgspec.structs.replace(
+        setup, heading_rad=tuple(np.deg2rad(np.arange(len(layout.names))).tolist())
+    )
+    export_csv(recorded, setup, motion, tmp_path / "out.csv")
+    told = json.loads(sidecar(tmp_path))
+    assert told["calibration"] == told["calibration_made"]["id"] == "S01-3"
+    assert told["calibration_made"]["takes"] == {"course": "ab" * 32}
+    assert told["calibration_residuals"] == [
+        {"joint": "index_pip", "sensor": "SN16", "residual_m_s2": 0.2, "place_sd_mm": [1.0] * 3}
+    ]
+    assert told["zero_source"] == "calibration"
+    assert told["sensor_calibration"]["software"] == "handstudio 8"
+    assert told["sensor_calibration"]["residuals"]["SN1"]["gyr_deg"] == pytest.approx(0.3)
+    assert told["heading_alignment_deg"]["SN4"] == pytest.approx(3.0)
+    other = msgspec.structs.replace(setup.subject, mirrored_from="S01-2")
+    setup = msgspec.structs.replace(setup, subject=other)
+    export_csv(recorded, setup, motion, tmp_path / "out.csv")
+    assert json.loads(sidecar(tmp_path))["zero_source"] == "mirror of the other hand"
 
 
 def test_loss_and_measured_rate_are_what_they_were(recorded, motion, tmp_path):

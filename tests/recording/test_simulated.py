@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from handstudio.hand.angles import hand_angles, joint_angles
 from handstudio.hand.pose import posed
 from handstudio.maths import so3
 from handstudio.process import process
+from handstudio.recording import writer
 from handstudio.recording.notes import load_notes
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
@@ -52,6 +54,20 @@ def test_a_seed_is_one_glove(tmp_path):
 
     assert recorded(1) == recorded(1)
     assert recorded(1) != recorded(2)
+
+
+def test_a_seed_and_a_start_are_one_file(tmp_path, monkeypatch):
+    def simulated(folder: str, start: datetime) -> bytes:
+        worn = rehearse(7, "open_close", parse("typical"), 3)
+        return simulate(tmp_path / folder, worn, seconds=1.0, start=start).read_bytes()
+
+    start = datetime(2026, 3, 4, 12, 30, 0, 250_000, tzinfo=UTC)
+    one = simulated("one", start)
+    monkeypatch.setattr(writer, "FLUSH_S", 0.0)  # as on a machine that is very slow
+    assert simulated("two", start.astimezone(timezone(timedelta(hours=9)))) == one
+    assert simulated("three", start + timedelta(seconds=1)) != one
+    (path,) = (tmp_path / "two").rglob("*.mcap")
+    assert path.parent.name == "2026-03-04"
 
 
 def test_labels_and_losses_of_a_person_at_work_stand_beside_the_take(tmp_path):

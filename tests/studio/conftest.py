@@ -26,6 +26,7 @@ from handstudio.recording.header import Header
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.subjects import Subject, create_subject
 from handstudio.recording.take import Take, open_take
+from handstudio.samples import ImuSamples
 from handstudio.settings import SettingsStore
 
 TICK_S = 0.016
@@ -50,6 +51,7 @@ class StillCapture:
     orders: list[Order] = field(default_factory=list)
     waiting: list[Report] = field(default_factory=list)
     motions: list[Motion] = field(default_factory=list)
+    samples: list[ImuSamples] = field(default_factory=list)
 
     def send(self, order: Order) -> None:
         self.orders.append(order)
@@ -57,6 +59,10 @@ class StillCapture:
     def drain(self) -> list[Motion]:
         motions, self.motions = self.motions, []
         return motions
+
+    def drain_samples(self) -> list[ImuSamples]:
+        samples, self.samples = self.samples, []
+        return samples
 
     def reports(self) -> list[Report]:
         waiting, self.waiting = self.waiting, []

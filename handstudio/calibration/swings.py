@@ -1,0 +1,190 @@
+"""A recorded course, prepared for what is computed from it: attitudes, smooth signals, swings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import savgol_filter
+
+from handstudio.arrays import Array
+from handstudio.calibration.attitudes import attitudes_between_rests, unbiased
+from handstudio.hand.skeleton import JOINTS
+from handstudio.layout import Layout
+from handstudio.maths import so3
+from handstudio.samples import STANDARD_GRAVITY
+
+SMOOTHING_S = 0.09
+"""Stretch that one local polynomial of fourth order is laid through: passes 5 Hz by 99 %."""
+
+_REST_EDGE_S = 0.05  # of a labelled rest: it is not still from its first instant on
+_BEFORE_S, _AFTER_S = 1.0, 0.3  # of the rest around a swing, which holds its attitude
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """One joint's exercise: the label, and its window with some rest around it."""
+
+    name: str
+    joint: str
+    turn: str
+    window: slice
+    moving: slice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swings:
+    """A course as arrays; sensors in the order of the layout.
+
+    Attributes:
+        layout: Of the glove.
+        rate_hz: Of the samples, which are evenly spaced.
+        q_world_sensor: Attitudes.
+        gyr: Without bias, smooth [rad/s].
+        dgyr: Its derivative [rad/s²].
+        acc: Specific force, smooth alike [m/s²].
+        swings: In order.
+        flat: The flat hand.
+        alive: Sensors that answered.
+    """
+
+    layout: Layout
+    rate_hz: float
+    q_world_sensor: Float[Array, "n s 4"]
+    gyr: Float[Array, "n s 3"]
+    dgyr: Float[Array, "n s 3"]
+    acc: Float[Array, "n s 3"]
+    swings: tuple[Swing, ...]
+    flat: slice
+    alive: tuple[int, ...]
+
+    def of_joint(self, joint: str, flexion: bool | None = None) -> list[Swing]:
+        """The swings of a joint; only its flexion, or only others, if asked for."""
+        mine = [swing for swing in self.swings if swing.joint == joint]
+        if flexion is None:
+            return mine
+        return [swing for swing in mine if (swing.turn == "flexion") == flexion]
+
+    def drivers(self, joint: str) -> tuple[int | None, int | None]:
+        """Sensors on parent and child of a joint; None: no sensor there answers."""
+        segments = {j.name: (j.parent, j.child) for j in JOINTS}[joint]
+        first = {}
+        for sensor in self.alive:
+            first.setdefault(self.layout.sensors[sensor].segment, sensor)
+        parent, child = segments
+        return None if parent is None else first.get(parent), first.get(child)
+
+    def q_flat(self, sensor: int) -> Float[Array, " 4"]:
+        """Attitude of a sensor in the middle of the flat hand."""
+        middle = (self.flat.start + self.flat.stop) // 2
+        at: Array = self.q_world_sensor[middle, sensor]
+        return at
+
+
+def prepared(
+    layout: Layout,
+    rate_hz: float,
+    gyr: Float[Array, "n s 3"],
+    acc: Float[Array, "n s 3"],
+    labels: Sequence[tuple[float, float, str]],
+    heading: Float[Array, " s"],
+    alive: Sequence[int],
+) -> Swings:
+    """Prepare a course.
+
+    Args:
+        layout: Of the glove.
+        rate_hz: Of the samples, evenly spaced from 0 s on.
+        gyr: Freed of the sensors' errors as far as they are known [rad/s].
+        acc: Likewise [m/s²].
+        labels: Begin and end [s] and name of every stretch; one at least is a rest or flat hand.
+        heading: Of every sensor's ``attitude(acc)`` at the first rest [rad].
+        alive: Sensors that answered.
+    """
+    rests = [_inner(a, b, rate_hz, len(gyr)) for a, b, name in labels if name in _STILL]
+    free = unbiased(gyr, rests)
+    time_s = np.arange(len(gyr)) / rate_hz
+    q = attitudes_between_rests(time_s, free, acc, rests, heading)
+    flats = [_inner(a, b, rate_hz, len(gyr)) for a, b, name in labels if name == "flat_hand"]
+    return Swings(
+        layout=layout,
+        rate_hz=rate_hz,
+        q_world_sensor=q,
+        gyr=smooth(free, rate_hz),
+        dgyr=smooth(free, rate_hz, 1),
+        acc=smooth(acc, rate_hz),
+        swings=tuple(_swing(a, b, name, rate_hz, len(gyr)) for a, b, name in labels if ":" in name),
+        flat=flats[-1] if flats else rests[0],
+        alive=tuple(alive),
+    )
+
+
+def smooth(
+    x: Float[Array, "n *b"], rate_hz: float, derivative: int = 0, stretch_s: float = SMOOTHING_S
+) -> Float[Array, "n *b"]:
+    """Low-passed, or its derivative, by local polynomials (Savitzky and Golay 1964)."""
+    length = max(5, 2 * round(0.5 * stretch_s * rate_hz) + 1)
+    out: Array = savgol_filter(x, length, 4, deriv=derivative, delta=1.0 / rate_hz, axis=0)
+    return out
+
+
+def settled(swings: Swings, give: Float[Array, " s"]) -> Swings:
+    """The same course as if boards did not tilt where the bone beneath them is accelerated.
+
+    Args:
+        swings: As felt.
+        give: Tilt of every board for acceleration along it [rad per m/s²]: a board is a mass on
+            soft skin, far below its own frequency, so tilt goes with acceleration.
+    """
+    moved = so3.rotate(swings.q_world_sensor, swings.acc) - [0.0, 0.0, STANDARD_GRAVITY]
+    moved = so3.rotate(so3.conjugate(swings.q_world_sensor), moved)
+    lean = np.stack([moved[..., 1], -moved[..., 0], np.zeros(moved.shape[:2])], axis=-1)
+    lean = lean * give[:, None]
+    tilt, rate, more = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
+    turned = so3.exp(tilt)
+    return replace(
+        swings,
+        q_world_sensor=so3.multiply(swings.q_world_sensor, so3.exp(-tilt)),
+        gyr=so3.rotate(turned, swings.gyr - rate),
+        dgyr=so3.rotate(turned, swings.dgyr - more),
+        acc=so3.rotate(turned, swings.acc),
+    )
+
+
+def relative_turn(swings: Swings, joint: str) -> Float[Array, "n 3"] | None:
+    """Rotation vector of a joint against the flat hand, in its parent sensor's frame [rad].
+
+    The elbow's is in the world's. None where a sensor is missing.
+    """
+    parent, child = swings.drivers(joint)
+    root = {j.name: j.parent is None for j in JOINTS}[joint]
+    if child is None or (parent is None and not root):
+        return None
+    rel, flat = swings.q_world_sensor[:, child], swings.q_flat(child)
+    if parent is not None:
+        rel = so3.multiply(so3.conjugate(swings.q_world_sensor[:, parent]), rel)
+        flat = so3.multiply(so3.conjugate(swings.q_flat(parent)), flat)
+    return so3.log(so3.multiply(rel, so3.conjugate(flat)))
+
+
+_CALM_S = 0.19  # of accelerations that are differentiated twice
+_STILL = ("static", "flat_hand", "rest")
+
+
+def _inner(start_s: float, end_s: float, rate_hz: float, count: int) -> slice:
+    return slice(
+        max(0, round((start_s + _REST_EDGE_S) * rate_hz)),
+        min(count, round((end_s - _REST_EDGE_S) * rate_hz)),
+    )
+
+
+def _swing(start_s: float, end_s: float, name: str, rate_hz: float, count: int) -> Swing:
+    joint, _, turn = name.partition(":")
+    wide = slice(
+        max(0, round((start_s - _BEFORE_S) * rate_hz)),
+        min(count, round((end_s + _AFTER_S) * rate_hz)),
+    )
+    moving = slice(max(0, round(start_s * rate_hz)), min(count, round(end_s * rate_hz)))
+    return Swing(name, joint, turn, wide, moving)
