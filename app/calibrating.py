@@ -8,10 +8,10 @@ from pathlib import Path
 
 from app.courses import Courses, Left
 from app.guided import Guided, Result, Stand
+from app.solving import SOLVED, Answer
 from app.sounds import Sound
 from app.state import State
 from app.takes import Taker
-from handstudio.calibrate import Calibrated
 from handstudio.calibration import watching
 from handstudio.device.addresses import VirtualWearer
 from handstudio.device.capture import Capture
@@ -24,8 +24,7 @@ from handstudio.settings import Settings
 from handstudio.wizards import course as wizard
 from handstudio.wizards.course import Cue, Event, Labelled, Leave, Lost, Perform, Samples
 
-SOLVED = ("hand",)
-"""Courses of which a calibration is computed."""
+_OF_HANDS = ("hand", "check")
 
 _TAKE_NAMES = {"hand": "calibration"}
 _PATIENCE_S = 5.0  # until a take that was asked for is on
@@ -96,8 +95,13 @@ class Calibrator:
                 "A take is being recorded.", "Stop it; a calibration records a take of its own."
             )
         no_hand = courses.layout.no_hand
-        if name in SOLVED and no_hand is not None:
+        if name in _OF_HANDS and no_hand is not None:
             raise no_hand
+        if name == "check" and (state.newest.setup is None or state.newest.setup.subject is None):
+            raise HandstudioError(
+                "There is no calibration that could be checked.",
+                "Calibrate this hand first, with the course Hand.",
+            )
         left = Left(courses.fresh(name)) if anew else courses.left(name)
         if left.course.phase is wizard.Phase.OVER:
             left = Left(courses.fresh(name))
@@ -187,7 +191,7 @@ class Calibrator:
                 self.solved(error)
 
     def to_solve(self) -> list[Path]:
-        """The takes to compute a calibration from, once the last of them is whole."""
+        """The takes to compute the result from, once the last of them is whole."""
         if self.result is None or not self.result.solving or self._closing is not None:
             return []
         takes = [self.sessions / name for name in self._takes]
@@ -200,13 +204,14 @@ class Calibrator:
             )
         return found
 
-    def solved(self, outcome: Calibrated | HandstudioError) -> None:
+    def solved(self, outcome: Answer | HandstudioError) -> None:
         """What came of it."""
         if self.result is None:
             return
-        good = outcome if isinstance(outcome, Calibrated) else None
-        error = outcome if isinstance(outcome, HandstudioError) else None
-        self.result = replace(self.result, solving=False, calibrated=good, error=error)
+        if isinstance(outcome, HandstudioError):
+            self.result = replace(self.result, solving=False, error=outcome)
+        else:
+            self.result = replace(self.result, solving=False, answer=outcome)
 
     # --- the take -------------------------------------------------------------------------------
 

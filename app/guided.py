@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 
+from app.solving import Answer
 from handstudio.calibrate import Calibrated
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import HandstudioError
 from handstudio.wizards.course import Course
 
@@ -22,6 +26,25 @@ class Guided:
     course: Course
     recording: bool = False
     problem: HandstudioError | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class InUse:
+    """The calibrations that everything shown rests on now.
+
+    Attributes:
+        subject: Of the wearer's hand; None: mean proportions.
+        sensors: Of the device's sensors; None: as they were shipped.
+        older: Ids of those of this hand that were made before, newest first.
+        none: Somebody wants none, although there is one.
+        now: When they were read.
+    """
+
+    subject: SubjectCalibration | None = None
+    sensors: DeviceCalibration | None = None
+    older: tuple[str, ...] = ()
+    none: bool = False
+    now: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +70,17 @@ class Result:
 
     Attributes:
         course: As it ended.
-        solving: A calibration is being computed from it.
-        calibrated: The calibration.
+        solving: What it is for is being computed.
+        answer: What was computed.
         error: Why there is none.
     """
 
     course: Course
     solving: bool = False
-    calibrated: Calibrated | None = None
+    answer: Answer | None = None
     error: HandstudioError | None = None
+
+    @property
+    def calibrated(self) -> Calibrated | None:
+        """The calibration of a hand, where that was computed."""
+        return self.answer if isinstance(self.answer, Calibrated) else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from app.look import View
 from handstudio.export.csv import Content
@@ -361,6 +361,13 @@ class CloseResult:
 
 
 @dataclass(frozen=True, slots=True)
+class UseCalibration:
+    """Use no calibration of the hand, the newest again, or the one before."""
+
+    which: Literal["none", "again", "previous"]
+
+
+@dataclass(frozen=True, slots=True)
 class ResetHeading:
     """Take the heading anew, of one sensor or, with None, of all."""
 
@@ -423,5 +430,6 @@ Intent: TypeAlias = (
     | RedoStep
     | LeaveCourse
     | CloseResult
+    | UseCalibration
     | ResetHeading
 )

@@ -10,11 +10,10 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
-from handstudio.calibrate import Calibrated, calibrate
+from app.solving import Answer, solve
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.process import process
-from handstudio.recording.calibrations import save_calibration
 from handstudio.recording.take import open_take
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
@@ -59,10 +58,10 @@ class Jobs:
         self._reset()
         return self._pool.submit(_export, path, target, content, window)
 
-    def calibrate(self, paths: Sequence[Path], sessions: Path) -> Future[Calibrated]:
-        """Compute the calibration of a subject from takes, and keep it with the subject."""
+    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
+        """Compute what a course is for from its takes, and keep what is to be used from now on."""
         self._reset()
-        return self._pool.submit(_calibrate, tuple(paths), sessions)
+        return self._pool.submit(_solve, course, tuple(paths), sessions)
 
     def cancel(self) -> None:
         """Stop the present job at its next step; its future then raises `Stopped`."""
@@ -111,7 +110,5 @@ def _export(path: Path, target: Path, content: Content, window: Window) -> Path:
     return export_csv(take, take.header.setup, motion, target, content=content, window=window)
 
 
-def _calibrate(paths: tuple[Path, ...], sessions: Path) -> Calibrated:
-    calibrated = calibrate([open_take(path) for path in paths], _tell)
-    save_calibration(sessions, calibrated.calibration)
-    return calibrated
+def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:
+    return solve(course, [open_take(path) for path in paths], sessions, _tell)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.guided import Guided, Result, Stand
+from app.guided import Guided, InUse, Result, Stand
 from app.live import LiveHistory
 from app.look import View
 from app.review import Review
@@ -74,6 +74,7 @@ class State:
         view: Where the picture is taken from; ``aimed`` counts how often it was asked for.
         yaw: Turn of the picture about the vertical; None: to be found anew.
         stands: Where the courses of the subject and the device stand.
+        in_use: The calibrations that are in use.
         guided: The course that is on.
         result: What came of the last course, until somebody has seen it.
         asking: The page that must say whose hand it is before a take can begin.
@@ -96,6 +97,7 @@ class State:
     shaking: Shaking | None = None
     review: Review | None = None
     stands: tuple[Stand, ...] = ()
+    in_use: InUse = InUse()
     guided: Guided | None = None
     result: Result | None = None
     work: Work | None = None

@@ -17,16 +17,20 @@ from app import diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
+from app.holding import Holder
 from app.jobs import Jobs, Stopped
 from app.keeping import Keeper
 from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
 from app.review import Review
+from app.solving import Answer, SensorsFound
 from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
 from app.workshop import Computed, Exported, Gathered, Solved, Workshop
+from handstudio.calibrate import Calibrated
+from handstudio.calibration.heading import HeadingAlignment
 from handstudio.device.capture import Capture
 from handstudio.device.orders import (
     Ask,
@@ -36,6 +40,7 @@ from handstudio.device.orders import (
     Phase,
     ResetHeading,
     SetHand,
+    SetHeading,
     TakeDone,
 )
 from handstudio.errors import HandstudioError
@@ -69,6 +74,7 @@ class Studio:
         self._keeper = Keeper(self.state.sessions)
         self._taker = Taker(self.capture, self.state.sessions)
         self._calibrator = Calibrator(self.capture, self._taker, self.state.sessions)
+        self._holder = Holder(self.capture, self.state.sessions)
         self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
@@ -349,10 +355,13 @@ class Studio:
             case intents.CloseResult():
                 if calibrator.result is not None and not calibrator.result.solving:
                     calibrator.result = None
+            case intents.UseCalibration(which=which):
+                self._holder.use(which)
             case intents.ResetHeading(sensor=sensor):
                 self.capture.send(ResetHeading(sensor))
-                of = sensor or _("all sensors")
-                self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
+                if self.state.newest.recorder is None:
+                    of = sensor or _("all sensors")
+                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
             case intents.OpenTake() | intents.ChooseSubject() | intents.DeleteSubject() if on:
                 raise HandstudioError(
                     "A course of calibration is on.", "Leave it first; it can be gone on with."
@@ -386,11 +395,14 @@ class Studio:
         except HandstudioError as error:
             self._sound(Sound.ALARM)
             self._say(error)
-        takes = calibrator.to_solve()
-        if takes and not self._solving:
+        takes, result = calibrator.to_solve(), calibrator.result
+        if takes and result is not None and not self._solving:
             self._solving = True
-            self._workshop.calibrate(takes, self.state.sessions)
+            self._workshop.solve(result.course.name, takes, self.state.sessions)
         self._show_guided()
+        for problem in self._holder.follow(self.state):
+            self._say(problem)
+        self.state = replace(self.state, in_use=self._holder.in_use)
 
     def _show_guided(self) -> None:
         calibrator, state = self._calibrator, self.state
@@ -567,14 +579,25 @@ class Studio:
                     self._send_file(download)
                 case Gathered(download=download):
                     self._send_file(download)
-                case Solved(calibrated=calibrated):
+                case Solved(answer=answer):
                     self._solving = False
-                    self._calibrator.solved(calibrated)
+                    self._calibrator.solved(answer)
+                    self._use(answer)
                 case Stopped():
                     self._tell(" ".join(words.in_words(outcome)))
                 case HandstudioError():
                     self._say(outcome)
         self.state = replace(self.state, work=self._workshop.work)
+
+    def _use(self, answer: Answer | HandstudioError) -> None:
+        """What a course was for, from now on."""
+        match answer:
+            case Calibrated() | SensorsFound():
+                self._holder.solved()
+            case HeadingAlignment() if answer.verdict.ok:
+                self.capture.send(SetHeading(answer.psi_cor))
+            case _:
+                pass
 
     def _show_computed(self, take: Take) -> None:
         motion = kept_motion(take)

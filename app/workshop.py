@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from app.jobs import Jobs
+from app.solving import Answer
 from app.state import Download, Work
 from app.words import _
-from handstudio.calibrate import Calibrated
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window
 from handstudio.recording.take import Take
@@ -40,9 +40,9 @@ class Gathered:
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A calibration was computed, or not, and why not."""
+    """What a course is for was computed, or not, and why not."""
 
-    calibrated: Calibrated | HandstudioError
+    answer: Answer | HandstudioError
 
 
 Outcome = Computed | Exported | Gathered | Solved
@@ -97,9 +97,9 @@ class Workshop:
         words = _("Gathering diagnostics")
         self._pending.append(_Pending(self._aside.submit(make), use, words))
 
-    def calibrate(self, paths: Sequence[Path], sessions: Path) -> None:
-        """The calibration of a subject."""
-        future = self.jobs.calibrate(paths, sessions)
+    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> None:
+        """What a course is for."""
+        future = self.jobs.solve(course, paths, sessions)
         words = _("Computing the calibration")
         self._pending.append(_Pending(future, Solved, words, Solved))
 

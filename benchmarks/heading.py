@@ -23,7 +23,8 @@ from benchmarks.trials import RATE_HZ, performance
 from handstudio.analysis.hand_error import heading_scatter
 from handstudio.arrays import Array
 from handstudio.calibration.attitude import attitude
-from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED, Tolerances, align, at_peak
+from handstudio.calibration.heading import align, at_peak
+from handstudio.calibration.heading_fit import CALIBRATED, UNCALIBRATED, Tolerances
 from handstudio.errors import CalibrationError
 from handstudio.layout import glove
 from handstudio.maths import so3

@@ -1,14 +1,33 @@
-"""Takes of a calibration → what is known of the hand: one function for page, shell and notebooks."""
+"""Takes of a calibration → what is known of the hand: for page, shell and notebooks alike."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import TypeAlias
 
+import msgspec
+import numpy as np
+
+from handstudio import __version__
+from handstudio.calibration.course import FLAT, HAND, REST, SWINGS, TURN, Step
+from handstudio.calibration.device import corrected
+from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
+from handstudio.calibration.quick_start import quick_start
+from handstudio.calibration.recorded import Recorded, even
+from handstudio.calibration.solve import found
 from handstudio.calibration.subject import SubjectCalibration
-from handstudio.calibration.verdict import Verdict
+from handstudio.calibration.swings import Swings, joined, prepared
+from handstudio.calibration.verdict import Reading, Verdict
+from handstudio.calibration.watching import observe
+from handstudio.errors import CalibrationError
+from handstudio.hand.skeleton import HandSide
+from handstudio.recording.calibrations import new_id
+from handstudio.recording.notes import Label, load_notes
 from handstudio.recording.take import Take
+from handstudio.samples import ImuSamples
+from handstudio.setup import Setup
 
 Progress: TypeAlias = Callable[[float], None]
 
@@ -32,9 +51,193 @@ class Calibrated:
 def calibrate(takes: Sequence[Take], progress: Progress = lambda _: None) -> Calibrated:
     """Calibrate a subject from the labels of takes; of a step done twice the last good one counts.
 
+    The glove must have stayed on between them: what is computed is how it sits, too.
+
     Raises:
         CalibrationError: the takes hold too little to calibrate anything, are of different people
             or hands, or of another glove.
         TakeError: a take cannot be read.
     """
-    raise NotImplementedError
+    _refuse_strangers(takes)
+    courses = []
+    for count, take in enumerate(takes):
+        courses.append(_course(take))
+        progress(0.4 * (count + 1) / len(takes))
+    verdicts = _verdicts(courses)
+    setup = takes[-1].header.setup
+    swings = joined([_prepared(course, verdicts) for course in courses])
+    _refuse_too_little(swings)
+    progress(0.6)
+    side: HandSide = "left" if setup.layout.side == "left" else "right"
+    hand = found(swings, side, setup.hand.hand_length_m)
+    progress(0.95)
+    now = datetime.now(UTC)
+    calibration = SubjectCalibration(
+        id=new_id(now),
+        made_utc=now.isoformat(timespec="seconds"),
+        software=f"handstudio {__version__}",
+        subject=takes[-1].header.subject,
+        side=side,
+        hand_length_m=setup.hand.hand_length_m,
+        hand_type=3,
+        device=setup.device.serial_number if setup.device is not None else "",
+        segments=hand.segments(),
+        tips=hand.tips(),
+        centres=hand.centres(),
+        axes=hand.functional_axes(),
+        verdicts=tuple(verdicts.values()),
+        takes=tuple((take.path.name, take.sha256()) for take in takes),
+    )
+    progress(1.0)
+    return Calibrated(calibration, tuple(verdicts.values()), _to_repeat(setup, verdicts))
+
+
+_SETTLING_S = 0.3
+_LEAST_SWINGS = 4  # joints; less is no calibration of a hand
+_STEPS = {step.name: step for step in HAND}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Course:
+    """One take of it, freed of the sensors' errors."""
+
+    take: Take
+    recorded: Recorded
+    labels: tuple[Label, ...]
+
+    @property
+    def setup(self) -> Setup:
+        return self.take.header.setup
+
+    def part(self, label: Label) -> ImuSamples:
+        return self.recorded.part(label.start_s, label.end_s, self.setup.rate_hz)
+
+    def rest_before(self, label: Label) -> Label | None:
+        rests = [x for x in self.labels if x.label == REST.name and x.end_s <= label.start_s + 0.5]
+        return max(rests, key=lambda x: x.end_s, default=None)
+
+
+def _course(take: Take) -> _Course:
+    setup = take.header.setup
+    labels = tuple(sorted(load_notes(take.path).labels, key=lambda x: (x.start_s, x.end_s)))
+    if not any(label.label in _STEPS for label in labels):
+        raise CalibrationError(
+            "{take}: no part of it is labelled as a step of a calibration.",
+            "Record one with the course under Calibrate, or label its parts (static, "
+            "heading_rotation, index_mcp:flexion ...).",
+            take=take.path.name,
+        )
+    runs = [event for events in take.events() for event in events if isinstance(event, ImuSamples)]
+    recorded = even(runs, setup.rate_hz)
+    if setup.sensors is not None:
+        free = corrected(recorded.samples, setup.sensors, setup.layout.names)
+        recorded = replace(recorded, samples=free)
+    return _Course(take, recorded, labels)
+
+
+def _verdicts(courses: Sequence[_Course]) -> dict[str, Verdict]:
+    """Of every step: that of the last time it was done well, else of the last time."""
+    out: dict[str, Verdict] = {}
+    for course in courses:
+        for label in course.labels:
+            if label.label not in _STEPS:
+                continue
+            step = _STEPS[label.label]
+            verdict = _judged(course, step, label)
+            if verdict.ok or step.name not in out or not out[step.name].ok:
+                out[step.name] = verdict
+    return out
+
+
+def _judged(course: _Course, step: Step, label: Label) -> Verdict:
+    before = course.rest_before(label) if step.kind in ("swing", "turn") else None
+    rest = None if before is None else course.part(_settled(before, 0.0))
+    done = _settled(label, step.least_s) if step.kind in ("rest", "pose") else label
+    return _storable(observe(step, rest, course.part(done), course.setup.layout))
+
+
+def _settled(label: Label, least_s: float) -> Label:
+    """A rest less its beginning, in which boards still swing from the movement before."""
+    latest = max(label.start_s, label.end_s - max(least_s, 1.0))
+    return msgspec.structs.replace(label, start_s=min(label.start_s + _SETTLING_S, latest))
+
+
+def _storable(verdict: Verdict) -> Verdict:
+    """Without figures that could not be had, which no text can hold; good it is not for that."""
+    known = tuple(r for r in verdict.readings if np.isfinite(r.value))
+    if verdict.ok or not all(r.ok for r in known):
+        return Verdict(verdict.step, known)
+    return Verdict(verdict.step, (*known, Reading("answering", 0.0, 100.0, "%")))
+
+
+def _prepared(course: _Course, verdicts: dict[str, Verdict]) -> Swings:
+    """A take's swings; those done badly only where nothing better is there."""
+    setup, samples = course.setup, course.recorded.samples
+    kept = []
+    for label in course.labels:
+        step = _STEPS.get(label.label)
+        bad = step is not None and step.kind == "swing" and not _judged(course, step, label).ok
+        if not (bad and verdicts[label.label].ok):
+            kept.append((label.start_s, label.end_s, label.label))
+    alignment, _ = quick_start(
+        samples,
+        setup.layout.names,
+        labels=kept,
+        compass=False,
+        tolerances=UNCALIBRATED if setup.sensors is None else CALIBRATED,
+    )
+    return prepared(
+        setup.layout,
+        setup.rate_hz,
+        samples.gyr,
+        samples.acc,
+        labels=_last_of_each(kept),
+        heading=np.array(alignment.psi_wg),
+        alive=course.recorded.alive,
+    )
+
+
+def _last_of_each(labels: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+    """Of a swing done twice the last one; rests all stay."""
+    last = {name: start for start, _, name in labels if ":" in name}
+    return [x for x in labels if ":" not in x[2] or last[x[2]] == x[0]]
+
+
+def _refuse_strangers(takes: Sequence[Take]) -> None:
+    if not takes:
+        raise CalibrationError("No take was named.", "Choose the takes of a calibration.")
+    first = takes[0].header
+    for take in takes:
+        setup = take.header.setup
+        if not setup.layout.is_hand:
+            raise CalibrationError(
+                "{take}: {why}",
+                "Calibrate with a glove.",
+                take=take.path.name,
+                why=setup.layout.no_hand,
+            )
+        if take.header.subject != first.subject or setup.layout != first.setup.layout:
+            raise CalibrationError(
+                "{take} is of another person, hand or glove than {first}.",
+                "Calibrate from takes of one person and one glove.",
+                take=take.path.name,
+                first=takes[0].path.name,
+            )
+
+
+def _refuse_too_little(swings: Swings) -> None:
+    count = len({swing.joint for swing in swings.swings})
+    if count < _LEAST_SWINGS:
+        raise CalibrationError(
+            "Only {count} joints were swung; a hand needs {least} at least.",
+            "Do the steps of the course that are missing, then calibrate again.",
+            count=count,
+            least=_LEAST_SWINGS,
+        )
+
+
+def _to_repeat(setup: Setup, verdicts: dict[str, Verdict]) -> tuple[str, ...]:
+    there = {joint.name for joint in setup.layout.instrumented_joints} | {"elbow"}
+    asked = [TURN, FLAT, *(step for step in SWINGS if step.joint in there)]
+    missing = [s.name for s in asked if s.name not in verdicts and not s.optional]
+    return (*missing, *(name for name, verdict in verdicts.items() if not verdict.ok))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
+import numpy as np
 import tyro
 
 from handstudio.commands import calibration as calibration_commands
@@ -21,6 +23,7 @@ from handstudio.commands import keeping
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.noise import noise
+from handstudio.commands.readings import show_verdicts
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
@@ -28,6 +31,7 @@ from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeErro
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.health.record import TakeHealth
+from handstudio.process import aligned_setup
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
@@ -37,7 +41,7 @@ from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import health_of_take
 from handstudio.settings import load_settings, settings_path
-from handstudio.setup import HandModel, filter_named
+from handstudio.setup import HandModel, Setup, filter_named
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 CONNECT_S = 25.0
@@ -170,6 +174,7 @@ def process(
     from_start: bool = False,
     calibration: str | None = None,
     sensors: str | None = None,
+    align: bool = False,
     csv: bool = False,
     json: Json = False,
 ) -> int:
@@ -181,6 +186,7 @@ def process(
         from_start: Ignore what the studio knew before the first byte of the take.
         calibration: File of another subject calibration than the take carries, or none.
         sensors: File of another calibration of the sensors than the take carries, or none.
+        align: Align the headings by the take's own quick start.
         csv: Also write the joint angles (orientations, where there is no hand) beside each take.
         json: Print JSON for a program instead of words.
     """
@@ -190,6 +196,8 @@ def process(
     for path in takes:
         take = open_take(path)
         setup = calibration_commands.chosen(take.header.setup, calibration, sensors)
+        if align:
+            setup = _aligned(take, setup)
         if filter is not None:
             setup = msgspec.structs.replace(setup, filter=filter_named(filter))
         with progress(path.name, quiet=json) as share:
@@ -217,6 +225,7 @@ def export(
     end_s: float | None = None,
     calibration: str | None = None,
     sensors: str | None = None,
+    align: bool = False,
 ) -> int:
     """Write joint angles, orientations or positions as CSV with a sidecar JSON.
 
@@ -228,9 +237,12 @@ def export(
         end_s: End of the window; the end of the take unless given.
         calibration: File of another subject calibration than the take carries, or none.
         sensors: File of another calibration of the sensors than the take carries, or none.
+        align: Align the headings by the take's own quick start.
     """
     opened = open_take(take)
     setup = calibration_commands.chosen(opened.header.setup, calibration, sensors)
+    if align:
+        setup = _aligned(opened, setup)
     with progress(take.name) as share:
         motion = process_take(opened, setup, progress=share)
     target = to or take.with_suffix(f".{content}.csv")
@@ -358,6 +370,18 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         code = 130
     sys.exit(code)
+
+
+def _aligned(take: Take, setup: Setup) -> Setup:
+    """Headings by the take's own quick start; how well is said beside the result."""
+    setup, found = aligned_setup(take, setup)
+    known = [sd for sd in found.sd if math.isfinite(sd)]
+    words = "{take}: headings aligned, standard deviation {middle:.2f} deg (worst {worst:.2f})."
+    figures = np.rad2deg([float(np.median(known)), max(known)])
+    err.print(words.format(take=take.path.name, middle=figures[0], worst=figures[1]))
+    if not found.verdict.ok:
+        show_verdicts((found.verdict,))
+    return setup
 
 
 def _hand(length_mm: float) -> HandModel:

@@ -108,7 +108,7 @@ def run(setup: Setup, state: State, events: Iterable[Event]) -> tuple[Motion, St
                 state = _run_samples(setup, state, _freed(setup, event), motions)
             case ImuSamples():
                 pass  # of a device that restarted with other sensors: not this setup's motion
-    return _turned(setup, join(motions)), state
+    return turned(setup, join(motions)), state
 
 
 def empty(sensors: int) -> Motion:
@@ -128,15 +128,7 @@ def join(motions: list[Motion]) -> Motion:
     return Motion(*(np.concatenate([getattr(m, name) for m in motions]) for name in _FIELDS))
 
 
-_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
-
-
-def _freed(setup: Setup, samples: ImuSamples) -> ImuSamples:
-    """Readings without the errors of the sensors, as far as they are known."""
-    return samples if setup.sensors is None else corrected(samples, setup.sensors, setup.layout.names)
-
-
-def _turned(setup: Setup, motion: Motion) -> Motion:
+def turned(setup: Setup, motion: Motion) -> Motion:
     """Orientations whose headings agree (4.22): a turn of each sensor about the vertical."""
     if not setup.heading_rad:
         return motion
@@ -147,6 +139,16 @@ def _turned(setup: Setup, motion: Motion) -> Motion:
         start = so3.multiply(turns[forearm], start)
     turned = so3.multiply(turns, motion.q_world_sensor)
     return replace(motion, q_world_sensor=turned, q_world_start=start)
+
+
+_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
+
+
+def _freed(setup: Setup, samples: ImuSamples) -> ImuSamples:
+    """Readings without the errors of the sensors, as far as they are known."""
+    if setup.sensors is None:
+        return samples
+    return corrected(samples, setup.sensors, setup.layout.names)
 
 
 def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[Motion]) -> State:

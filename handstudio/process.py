@@ -19,9 +19,12 @@ import msgspec
 import numpy as np
 
 from handstudio import __version__, pipeline
+from handstudio.alignment import aligned
 from handstudio.arrays import Array
+from handstudio.calibration.heading import HeadingAlignment
 from handstudio.errors import SetupError, TakeError
 from handstudio.pipeline import Motion
+from handstudio.recording.notes import load_notes
 from handstudio.recording.take import Take
 from handstudio.samples import Event, ImuSamples
 from handstudio.setup import Setup
@@ -79,6 +82,22 @@ def process(
 def kept_motion(take: Take) -> Motion | None:
     """The motion of a take where it was computed before and is whole, else None."""
     return _opened(motion_folder(take, take.header.setup, from_start=False))
+
+
+def aligned_setup(take: Take, setup: Setup | None = None) -> tuple[Setup, HeadingAlignment]:
+    """The setup whose headings agree by a take's own quick start, and how well they do.
+
+    Args:
+        take: The recording; its labels say where the quick start is, else it is looked for.
+        setup: Another setup than the take's own.
+
+    Raises:
+        CalibrationError: there is no quick start in it, or none that can be used.
+        TakeError: the take or its notes cannot be read.
+    """
+    labels = [(each.start_s, each.end_s, each.label) for each in load_notes(take.path).labels]
+    runs = [one for one in chain.from_iterable(take.events()) if isinstance(one, ImuSamples)]
+    return aligned(setup or take.header.setup, runs, labels)
 
 
 def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:

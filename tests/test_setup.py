@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from handstudio import setup as setups
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import LayoutError, SetupError
 from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.layout import glove
@@ -30,6 +32,19 @@ ABOUT = Description(
     accelerometer_range_g=8.0,
     gyroscope_range_dps=1000.0,
     magnetometer_range_ut=4912.0,
+)
+
+HAND = SubjectCalibration(
+    id="20260203-040506-000",
+    made_utc="2026-02-03T04:05:06Z",
+    software="handstudio",
+    subject="S01",
+    side="left",
+    hand_length_m=0.18,
+    hand_type=3,
+    device="42",
+    segments=(),
+    tips=(),
 )
 
 
@@ -90,6 +105,9 @@ def test_the_key_tells_every_change_and_nothing_else():
         "device": None,
         "zero": "functional axes",
         "calibration": "S01-3",
+        "sensors": DeviceCalibration("42", "2026-02-03T04:05:06Z", "handstudio", (), ()),
+        "heading_rad": (0.1, 0.0, -0.1),
+        "subject": HAND,
     }
     assert other.keys() == set(Setup.__struct_fields__)
     keys = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import viser
 
@@ -18,6 +18,8 @@ from app.words import _
 from handstudio.calibration.course import COURSES
 from handstudio.device.orders import Phase
 from handstudio.wizards.course import GoByItself
+
+Which: TypeAlias = Literal["none", "again", "previous"]
 
 _SHEET_PX = (660.0, 392.0)
 _RESULT_PX = (660.0, 640.0)
@@ -43,6 +45,11 @@ class CalibratePanel:
         self._sheet = gui.add_html("")
         names = sorted(COURSES, key=_ORDER.index) if set(COURSES) <= set(_ORDER) else list(COURSES)
         self._rows = {name: _CourseRow(gui, send, name) for name in names}
+        self._none = gui.add_button(_("Use no calibration"), color=QUIET, visible=False)
+        self._again = gui.add_button(_("Use the calibration again"), color=QUIET, visible=False)
+        self._previous = gui.add_button(_("Use the calibration before"), color=QUIET, visible=False)
+        for which, handle in self._uses().items():
+            handle.on_click(_using(send, which))
         with gui.add_folder(_("Heading"), expand_by_default=False):
             self._all = _("All sensors")
             self._which = gui.add_dropdown(_("Sensor"), (self._all,))
@@ -75,6 +82,10 @@ class CalibratePanel:
         stands = {stand.name: stand for stand in view.stands_of(state)}
         for name, row in self._rows.items():
             row.render(None if on else stands.get(name), ready=_ready(state))
+        in_use = state.in_use
+        put(self._none, visible=not on and in_use.subject is not None)
+        put(self._again, visible=not on and in_use.none)
+        put(self._previous, visible=not on and bool(in_use.older) and not in_use.none)
         setup = state.newest.setup
         sensors = (self._all, *(setup.layout.names if setup is not None else ()))
         put(self._which, options=sensors)
@@ -89,8 +100,15 @@ class CalibratePanel:
         put(self._step, value=list(choices)[chosen if index == self._index else index])
         self._index = index
 
+    def _uses(self) -> dict[Which, viser.GuiButtonHandle]:
+        return {"none": self._none, "again": self._again, "previous": self._previous}
+
     def _sensor(self) -> str | None:
         return None if self._which.value == self._all else self._which.value
+
+
+def _using(send: Send, which: Which) -> Callable[[Any], None]:
+    return lambda _event: send(intents.UseCalibration(which))
 
 
 _ORDER = ("hand", "check", "quick_start", "sensors", "noise")
@@ -149,7 +167,7 @@ class CoursePanel:
         if sheet is None:
             return
         self._shown = sheet
-        large = state.result is not None and state.result.calibrated is not None
+        large = state.result is not None and state.result.answer is not None
         if large != self._large:
             self._large = large
             self._place(large=large)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import html
 from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from app.state import State
+from app.views.answers import day_of
 from app.words import _
+from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.orders import Phase
 from handstudio.pipeline import Doubt
 
@@ -28,7 +32,7 @@ class Step:
 
 def steps_of(state: State) -> tuple[Step, ...]:
     """The steps in the order in which they are taken."""
-    return (_device(state), _rest(state), _hand(state), _zero(state))
+    return (_device(state), _rest(state), _hand(state), _sensors(state), _zero(state))
 
 
 def as_html(steps: tuple[Step, ...]) -> str:
@@ -73,16 +77,67 @@ def _hand(state: State) -> Step:
     return Step(title, "now" if state.newest.setup is not None else "open", figure, advice)
 
 
-def _zero(_state: State) -> Step:
+def _zero(state: State) -> Step:
+    title, used = _("Joints and zero"), state.in_use.subject
+    if used is not None:
+        other = _other_glove(state, used)
+        return Step(title, "now" if other else "done", _made(state, used), other)
+    if state.in_use.none:
+        return Step(title, "open", _("nominal, as asked: there is a calibration"))
     return Step(
-        _("Joints and zero"),
+        title,
         "open",
-        _("nominal"),
+        _("nominal: no calibration"),
         _(
             "Joint centres and axes are those of an average hand, and sensors count as mounted "
             "along their segments: angles carry the mounting's tilt as an offset."
         ),
     )
+
+
+def _sensors(state: State) -> Step:
+    title, used = _("Sensors"), state.in_use.sensors
+    if used is None:
+        advice = _("As they were shipped: scales may be off by some per cent.")
+        return Step(title, "open", _("no calibration"), advice)
+    words = _("calibrated {made}, {age}").format(
+        made=day_of(used.made_utc), age=_age(state, used.made_utc)
+    )
+    return Step(title, "done", words)
+
+
+def _made(state: State, used: SubjectCalibration) -> str:
+    """Which one it is: when it was made, how old that is, from which take and on which glove."""
+    takes = ", ".join(Path(name).stem for name, _sha in used.takes) or used.mirrored_from or "–"
+    return _("calibrated {made}, {age}, from {take}, glove {glove}").format(
+        made=day_of(used.made_utc),
+        age=_age(state, used.made_utc),
+        take=takes,
+        glove=used.device or "–",
+    )
+
+
+def _other_glove(state: State, used: SubjectCalibration) -> str:
+    setup = state.newest.setup
+    serial = setup.device.serial_number if setup is not None and setup.device is not None else ""
+    if not serial or not used.device or serial == used.device:
+        return ""
+    return _("This is the glove {serial}: its sensors sit otherwise; calibrate with it.").format(
+        serial=serial
+    )
+
+
+def _age(state: State, made_utc: str) -> str:
+    """How old it was when it was read."""
+    now = state.in_use.now
+    try:
+        made = datetime.fromisoformat(made_utc)
+    except ValueError:
+        made = None
+    if now is None or made is None or made.tzinfo is None:
+        return _("of unknown age")
+    days = (now.date() - made.date()).days
+    return _("today") if days <= 0 else _("{days} d old").format(days=days)
 
 
 _SIGNS = {"done": ("✓", "#12b886"), "now": ("●", "#f5a524"), "open": ("○", "currentColor")}

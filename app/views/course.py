@@ -14,6 +14,8 @@ from app.courses import stands_without_device
 from app.ghost import ghost_of
 from app.guided import Guided, Result, Stand
 from app.state import State
+from app.views.answers import answer_of
+from app.views.pieces import AMBER, GREEN, GREY, RED, big, frame, line, sentence, small, table
 from app.views.steps import (
     cost_of,
     course_name,
@@ -43,8 +45,6 @@ from handstudio.wizards.course import (
     Skip,
     Standing,
 )
-
-GREEN, AMBER, RED, GREY = "#12b886", "#f5a524", "#e5484d", "rgba(128,132,140,.35)"
 
 Choice: TypeAlias = tuple[str, intents.Intent]
 """A button: its words, and what it asks for."""
@@ -86,7 +86,7 @@ def _step_sheet(guided: Guided, *, lost: bool) -> Sheet:
     if lost and course.phase in (Phase.INTRO, Phase.VERDICT):  # the others say so themselves
         words = html.escape(_("Device lost: check the cable."))
         body += f'<div style="font-size:1.1rem;color:{RED}">{words}</div>'
-    content = _frame(_head(course) + body)
+    content = frame(_head(course) + body)
     return Sheet(content, _first(guided), _others(guided))
 
 
@@ -104,23 +104,23 @@ def _head(course: Course) -> str:
 
 def _body(course: Course) -> str:  # noqa: PLR0911 - a list
     """What the phase has to show, beside the sentence that stays."""
-    sentence = _sentence(sentence_of(course.step))
+    sentence = sentence(sentence_of(course.step))
     match course.phase:
         case Phase.INTRO:
-            return _big("●", GREY, sentence + _small(_introduction(course)))
+            return big("●", GREY, sentence + small(_introduction(course)))
         case Phase.COUNTDOWN:
-            return _big(str(course.count), AMBER, sentence + _small(_trouble(course)))
+            return big(str(course.count), AMBER, sentence + small(_trouble(course)))
         case Phase.RESTING:
-            return _big("‖", AMBER, _sentence(_("Keep still …")) + _bars(course.live))
+            return big("‖", AMBER, sentence(_("Keep still …")) + _bars(course.live))
         case Phase.DOING:
-            return _big(_clock(course), GREEN, sentence + _bars(course.live))
+            return big(_clock(course), GREEN, sentence + _bars(course.live))
         case Phase.VERDICT:
             return _verdict(course.step, course.outcome)
         case Phase.AWAY:
             words = _("Device lost: check the cable. This step begins anew once it is back.")
-            return _big("!", RED, _sentence(words))
+            return big("!", RED, sentence(words))
         case Phase.OVER:
-            return _big("✓", GREEN, _sentence(_("Done.")))
+            return big("✓", GREEN, sentence(_("Done.")))
 
 
 def _introduction(course: Course) -> str:
@@ -148,20 +148,20 @@ def _verdict(step: Step, outcome: Outcome) -> str:
     verdict = outcome.verdict
     failing = verdict.failing if verdict is not None else ()
     if outcome.standing is Standing.GOOD:
-        return _big("✓", GREEN, _sentence(_("Good."), GREEN) + _bars(verdict))
+        return big("✓", GREEN, sentence(_("Good."), GREEN) + _bars(verdict))
     told = "".join(
         f'<div style="font-size:1.3rem;line-height:1.3">{html.escape(words)}</div>'
         for words in (failing_of(reading, step.joint) for reading in failing[:2])
     )
     more = len(failing) - 2
-    rest = _small(_("and {count} more").format(count=more)) if more > 0 else ""
-    cost = _small(_("Used all the same: {cost}").format(cost=cost_of(step)))
-    return _big("✗", RED, _sentence(_("Not good enough."), RED) + told + rest + cost)
+    rest = small(_("and {count} more").format(count=more)) if more > 0 else ""
+    cost = small(_("Used all the same: {cost}").format(cost=cost_of(step)))
+    return big("✗", RED, sentence(_("Not good enough."), RED) + told + rest + cost)
 
 
 def _problem(guided: Guided) -> str:
     what, remedy = in_words(guided.problem) if guided.problem is not None else ("", "")
-    return _big("!", RED, _sentence(what) + _small(remedy))
+    return big("!", RED, sentence(what) + small(remedy))
 
 
 def _first(guided: Guided) -> Choice | None:
@@ -200,7 +200,7 @@ def _others(guided: Guided) -> tuple[Choice, ...]:
 
 def _bars(verdict: Verdict | None) -> str:
     if verdict is None:
-        return _small(_("Looking …"))
+        return small(_("Looking …"))
     return f'<div style="margin-top:.35em">{"".join(map(_bar, verdict.readings[:5]))}</div>'
 
 
@@ -307,24 +307,26 @@ def minutes_of(seconds: float) -> str:
 
 def _result_sheet(result: Result, state: State) -> Sheet:
     if result.solving:
-        share = state.work.share if state.work is not None else 0.0
-        words = _("Computing the calibration …")
+        named, share = result.course.name, state.work.share if state.work is not None else 0.0
+        words = _("Computing the calibration …") if named == "hand" else _("Computing …")
         bar = (
             f'<div style="height:.75em;margin:.6em 0;background:{GREY};border-radius:3px">'
             f'<div style="height:100%;width:{100 * share:.0f}%;background:{GREEN};'
             'border-radius:3px"></div></div>'
         )
-        content = _big("●", AMBER, _sentence(words) + bar)
-        return Sheet(_frame(content), None, ((_("Cancel"), intents.CancelWork()),))
+        content = big("●", AMBER, sentence(words) + bar)
+        return Sheet(frame(content), None, ((_("Cancel"), intents.CancelWork()),))
     close: Choice = (_("Close"), intents.CloseResult())
     if result.error is not None:
         what, remedy = in_words(result.error)
-        content = _big("✗", RED, _sentence(_("No calibration.")) + _line(what) + _small(remedy))
-        return Sheet(_frame(content), close, _redo(result))
-    if result.calibrated is None:
-        content = _sentence(_("Done.")) + _line(_("The take is kept; its labels name every step."))
-        return Sheet(_frame(_big("✓", GREEN, content)), close)
-    return Sheet(_frame(_calibrated(result)), close, _redo(result))
+        none = _("No calibration.") if result.course.name == "hand" else _("No result.")
+        content = big("✗", RED, sentence(none) + line(what) + small(remedy))
+        return Sheet(frame(content), close, _redo(result))
+    if result.answer is None:
+        content = sentence(_("Done.")) + line(_("The take is kept; its labels name every step."))
+        return Sheet(frame(big("✓", GREEN, content)), close)
+    content = _calibrated(result) if result.calibrated is not None else answer_of(result.answer)
+    return Sheet(frame(content), close, _redo(result))
 
 
 def _redo(result: Result) -> tuple[Choice, ...]:
@@ -351,26 +353,21 @@ def _calibrated(result: Result) -> str:
     told = ""
     if repeat:
         steps = ", ".join(names.get(name, name) for name in repeat)
-        told += _line(_("Worth repeating: {steps}.").format(steps=steps))
+        told += line(_("Worth repeating: {steps}.").format(steps=steps))
     if odd:
         who = ", ".join(joint_name(segment.name) for segment in odd)
-        told += _line(_("Unusual lengths: {segments}.").format(segments=who))
+        told += line(_("Unusual lengths: {segments}.").format(segments=who))
     colour = GREEN if good else AMBER
-    head = _big("✓" if good else "!", colour, _sentence(word, colour) + told)
+    head = big("✓" if good else "!", colour, sentence(word, colour) + told)
     return head + _segments(calibration) + _residuals(calibration)
 
 
 def _segments(calibration: SubjectCalibration) -> str:
     titles = (_("Segment"), _("Length"), _("Among people"), _("From"))
-    cells = "".join(f'<th style="text-align:left;padding-right:1.2em">{t}</th>' for t in titles)
-    rows = "".join(map(_segment, calibration.segments))
-    return (
-        '<table style="font-size:.85rem;line-height:1.4;border-collapse:collapse;'
-        f'font-variant-numeric:tabular-nums;white-space:nowrap;margin-top:.4em"><tr>{cells}</tr>{rows}</table>'
-    )
+    return table(titles, [_segment(segment) for segment in calibration.segments])
 
 
-def _segment(segment: Segment) -> str:
+def _segment(segment: Segment) -> tuple[str, tuple[str, ...]]:
     sources = {
         "measured": _("measured"),
         "with prior": _("measured, with average proportions"),
@@ -380,9 +377,7 @@ def _segment(segment: Segment) -> str:
     length = f"{1e3 * segment.length_m:.1f} ± {1e3 * segment.length_sd_m:.1f} mm"
     among = _("{sd:+.1f} SD").format(sd=segment.plausible)
     cells = (joint_name(segment.name), length, among, sources[segment.length_source])
-    colour = f"color:{AMBER}" if odd else ""
-    inner = "".join(f'<td style="padding-right:1.2em">{html.escape(cell)}</td>' for cell in cells)
-    return f'<tr style="{colour}">{inner}</tr>'
+    return AMBER if odd else "", cells
 
 
 def _residuals(calibration: SubjectCalibration) -> str:
@@ -393,7 +388,7 @@ def _residuals(calibration: SubjectCalibration) -> str:
         len(calibration.centres) // 2
     ]
     words = _("Left of the accelerations: {middle:.2f} m/s² in the middle, {worst:.2f} at {joint}.")
-    return _small(words.format(middle=middle, worst=worst.residual, joint=joint_name(worst.joint)))
+    return small(words.format(middle=middle, worst=worst.residual, joint=joint_name(worst.joint)))
 
 
 # --- the hand that shows it -----------------------------------------------------------------------
@@ -429,37 +424,3 @@ def ghost_view(state: State) -> GhostView | None:
     shown = course.phase in (Phase.INTRO, Phase.DOING)
     seconds = (course.now_us or 0) * 1e-6 if shown else 0.0
     return GhostView(ghost.skeleton, ghost.at(seconds), ghost.moving, _("Like this"))
-
-
-# --- pieces ---------------------------------------------------------------------------------------
-
-
-def _frame(content: str) -> str:
-    # as high as the fullest step, so that the buttons below stay where they are
-    return f'<div style="padding:.6em 1em .3em;min-height:15.2rem">{content}</div>'
-
-
-def _big(sign: str, colour: str, beside: str) -> str:
-    return (
-        '<div style="display:flex;gap:1.1em;align-items:flex-start">'
-        f'<div style="font:700 4.6rem/1 system-ui,sans-serif;color:{colour};min-width:1.05em;'
-        f'text-align:center;font-variant-numeric:tabular-nums">{html.escape(sign)}</div>'
-        f'<div style="flex:1;min-width:0">{beside}</div></div>'
-    )
-
-
-def _sentence(words: str, colour: str = "inherit") -> str:
-    return (
-        f'<div style="font-size:1.75rem;line-height:1.2;font-weight:600;color:{colour}">'
-        f"{html.escape(words)}</div>"
-    )
-
-
-def _line(words: str) -> str:
-    return f'<div style="font-size:1.1rem;line-height:1.4">{html.escape(words)}</div>'
-
-
-def _small(words: str) -> str:
-    if not words:
-        return ""
-    return f'<div style="font-size:.95rem;line-height:1.4;opacity:.75">{html.escape(words)}</div>'

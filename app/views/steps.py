@@ -40,6 +40,7 @@ def title_of(step: Step) -> str:
         "rest": _("Rest"),
         "turn": _("Lift the arm"),
         "pose": _("Flat hand"),
+        "grasp": _("Open and close"),
         "tumble": _("All directions"),
         "noise": _("Long rest"),
         "tryout": _("Try it out"),
@@ -88,6 +89,7 @@ def sentence_of(step: Step) -> str:
         "rest": _("Lay arm and hand flat on the table and keep still."),
         "turn": _("Hand and fingers stiff: lift the forearm at the elbow, and lay it back."),
         "pose": _("Lay the hand flat on the table, fingers straight, and keep still."),
+        "grasp": _("Open the hand wide, make a fist, and again."),
         "tumble": _("Lay it down in one direction after the other, two seconds still in each."),
         "noise": _("Lay the glove on something solid and leave it alone."),
         "tryout": _("Touch the thumb to every fingertip, then make a fist."),
@@ -129,7 +131,7 @@ def _swing_sentence(step: Step) -> str:
     return sentence.format(finger=fingers.get(finger, finger), joint=joint_name(step.joint))
 
 
-def cost_of(step: Step) -> str:
+def cost_of(step: Step) -> str:  # noqa: PLR0911 - a list
     """What it costs to skip a step, or to use one that was refused."""
     match step.kind:
         case "fit":
@@ -140,6 +142,8 @@ def cost_of(step: Step) -> str:
             return _("Place and axis of this joint then lean on average proportions.")
         case "pose":
             return _("The zero of all angles is less sure.")
+        case "grasp":
+            return _("The check then says less of how fingers bend.")
         case "tumble" | "noise":
             return _("The sensors stay as they were known before.")
         case "tryout":
@@ -197,6 +201,9 @@ def failing_of(reading: Reading, joint: str = "") -> str:
     said, remedy = _said_of(reading), _remedy_of(reading)
     if reading.what == "others" and joint and reading.about == joint:
         said, remedy = _("It bent along by"), _("move it from side to side only.")
+    if reading.what == "range" and reading.about:
+        said = _("{about} bent by").format(about=joint_name(reading.about))
+        remedy = _("open the hand wide and make a whole fist.")
     return _("{what} {figures}: {remedy}").format(what=said, figures=figures, remedy=remedy)
 
 

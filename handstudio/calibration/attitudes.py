@@ -15,9 +15,7 @@ from handstudio.calibration.attitude import attitude
 from handstudio.maths import so3
 
 
-def unbiased(
-    gyr: Float[Array, "n s 3"], rests: Sequence[slice]
-) -> Float[Array, "n s 3"]:
+def unbiased(gyr: Float[Array, "n s 3"], rests: Sequence[slice]) -> Float[Array, "n s 3"]:
     """Angular velocity less the bias of every rest, straight between the middles of rests.
 
     A sensor that moved in a rest, as a glove does that slips, tells no bias there: one that is

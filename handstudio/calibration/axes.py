@@ -22,6 +22,7 @@ class JointAxis:
         sd_rad: How well its direction is known.
         angle: Turn about it against the flat hand, and two derivatives [rad, s].
         sideways: The same about the second axis; None where that was not swung.
+        across: The second axis, square to the first, in the world at the flat hand.
     """
 
     joint: str
@@ -29,6 +30,7 @@ class JointAxis:
     sd_rad: float
     angle: tuple[Float[Array, " n"], Float[Array, " n"], Float[Array, " n"]]
     sideways: tuple[Float[Array, " n"], Float[Array, " n"], Float[Array, " n"]] | None = None
+    across: Float[Array, " 3"] | None = None
 
     def seen_from(self, swings: Swings, sensor: int) -> Float[Array, " 3"]:
         """The axis in the frame of a sensor, the hand lying flat."""
@@ -51,13 +53,15 @@ def flexion_axis(swings: Swings, joint: str) -> JointAxis | None:
     in_world = axis if parent is None else so3.rotate(swings.q_flat(parent), axis)
     if in_world @ _lateral(swings, joint) < 0.0:
         axis, in_world = -axis, -in_world
-    sideways = None
+    sideways, across = None, None
     others = swings.of_joint(joint, flexion=False)
     if others:
         second, _ = principal_axis(np.concatenate([_rate_in_parent(swings, s) for s in others]))
         second = second - axis * (second @ axis)
-        sideways = _derived(swings, turn @ (second / np.linalg.norm(second)))
-    return JointAxis(joint, in_world, sd, _derived(swings, turn @ axis), sideways)
+        second = second / np.linalg.norm(second)
+        sideways = _derived(swings, turn @ second)
+        across = second if parent is None else so3.rotate(swings.q_flat(parent), second)
+    return JointAxis(joint, in_world, sd, _derived(swings, turn @ axis), sideways, across)
 
 
 def _derived(swings: Swings, angle: Array) -> tuple[Array, Array, Array]:

@@ -9,10 +9,13 @@ import msgspec
 from handstudio.hand.skeleton import FINGERS
 from handstudio.layout import Layout
 
-Kind: TypeAlias = Literal["fit", "rest", "turn", "swing", "pose", "tumble", "noise", "tryout"]
+Kind: TypeAlias = Literal[
+    "fit", "rest", "turn", "swing", "pose", "grasp", "tumble", "noise", "tryout"
+]
 """fit: the glove sits and every sensor answers; rest: nothing moves; turn: the whole rig is turned
-about a level axis; swing: one joint to and fro; pose: the hand lies flat; tumble: the board lies
-still in many directions; noise: nothing moves for long; tryout: a look at the result."""
+about a level axis; swing: one joint to and fro; pose: the hand lies flat; grasp: it
+opens and closes; tumble: the board lies still in many directions; noise: nothing moves for long;
+tryout: a look at the result."""
 
 
 class Step(msgspec.Struct, frozen=True):
@@ -60,6 +63,7 @@ FIT = Step("fit", "fit", least_s=2.0, most_s=60.0)
 REST = Step("static", "rest", least_s=2.0, most_s=6.0, perform="static")
 TURN = Step("heading_rotation", "turn", least_s=1.5, most_s=6.0, perform="heading_rotation")
 FLAT = Step("flat_hand", "pose", least_s=2.0, most_s=8.0, perform="flat_hand")
+GRASP = Step("open_close", "grasp", least_s=5.0, most_s=12.0, perform="open_close")
 TRYOUT = Step("tryout", "tryout", least_s=5.0, most_s=60.0, optional=True, perform="tryout")
 TUMBLE = Step("tumble", "tumble", least_s=30.0, most_s=180.0, perform="tumble")
 NOISE = Step("rest", "noise", least_s=600.0, most_s=7200.0, perform="rest:3600")
@@ -85,8 +89,12 @@ QUICK_START: tuple[Step, ...] = (REST, TURN, REST)
 HAND: tuple[Step, ...] = (FIT, *QUICK_START, *SWINGS, FLAT, TRYOUT)
 """The course that calibrates a subject."""
 
+CHECK: tuple[Step, ...] = (*QUICK_START, FLAT, GRASP)
+"""Whether yesterday's calibration still holds, the glove having been put on again."""
+
 COURSES: dict[str, tuple[Step, ...]] = {
     "hand": HAND,
+    "check": CHECK,
     "quick_start": QUICK_START,
     "sensors": (FIT, TUMBLE),
     "noise": (FIT, NOISE),

@@ -47,6 +47,9 @@ TOGETHER_DEG = 10.0
 STIFF_DEG_S = 1.0
 """Tremor of a hand that is lifted stiffly, at some 10 Hz; the lift itself makes a tenth of it."""
 
+GRASP_DEG = 35.0
+"""That every finger bends by at MCP and PIP in a grasp: half of a fist."""
+
 SIDEWAYS = 0.35
 """How much a joint may bend while it is moved to a side, and the like, as a share. A sensor that
 sits crooked by 10 degrees makes half of it."""

@@ -11,13 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
-from handstudio.calibration.rigid_rotation import (
-    BIAS_SD,
-    CentreEstimate,
-    RigidRotation,
-    excitation,
-    fit,
-)
+from handstudio.calibration.rigid_rotation import BIAS_SD, CentreEstimate, RigidRotation, excitation
+from handstudio.calibration.robust_fit import fit
 
 
 def centre(rotation: RigidRotation, bias_sd: float = BIAS_SD) -> CentreEstimate:

@@ -15,13 +15,9 @@ from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
 from handstudio.calibration.course import REST, TURN
-from handstudio.calibration.heading import (
-    LEAST_TURN,
-    UNCALIBRATED,
-    HeadingAlignment,
-    Tolerances,
-    align,
-)
+from handstudio.calibration.heading import HeadingAlignment, align
+from handstudio.calibration.heading_fit import UNCALIBRATED, Tolerances
+from handstudio.calibration.rig_turn import LEAST_TURN
 from handstudio.errors import CalibrationError
 from handstudio.samples import ImuSamples
 

@@ -55,8 +55,10 @@ def steadied(swings: Swings, axes: Mapping[str, JointAxis], found: Rocking) -> S
         for (which, joint), share in found.items():
             if which == sensor:
                 axis = share * axes[joint].seen_from(swings, sensor)
-                for sum_, x in zip((tilt, rate, more), axes[joint].angle, strict=True):
-                    sum_ += x[:, None] * axis
+                angle = axes[joint].angle
+                tilt += angle[0][:, None] * axis
+                rate += angle[1][:, None] * axis
+                more += angle[2][:, None] * axis
         q[:, sensor] = so3.multiply(q[:, sensor], so3.exp(-tilt))
         turned = so3.exp(tilt)
         gyr[:, sensor] = so3.rotate(turned, gyr[:, sensor] - rate)

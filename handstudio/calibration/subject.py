@@ -113,7 +113,8 @@ class SubjectCalibration(msgspec.Struct, frozen=True):
         subject: Code of the person.
         side: Which hand.
         hand_length_m: Wrist to the tip of the middle finger, as given or as measured.
-        hand_type: 1: one rigid palm; 2: two blocks from the wrist; 3: radial and hinged ulnar block.
+        hand_type: 1: one rigid palm; 2: two blocks from the wrist; 3: radial and hinged ulnar
+            block.
         device: Serial number of the glove; its sensors sit as they sat then.
         segments: All segments of the skeleton, in its order.
         tips: All fingertips.

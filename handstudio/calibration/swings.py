@@ -19,7 +19,7 @@ from handstudio.samples import STANDARD_GRAVITY
 SMOOTHING_S = 0.09
 """Stretch that one local polynomial of fourth order is laid through: passes 5 Hz by 99 %."""
 
-_REST_EDGE_S = 0.05  # of a labelled rest: it is not still from its first instant on
+_SETTLING_S, _END_S = 0.25, 0.05  # of a labelled rest: boards swing on from the movement before
 _BEFORE_S, _AFTER_S = 1.0, 0.3  # of the rest around a swing, which holds its attitude
 
 
@@ -70,7 +70,7 @@ class Swings:
     def drivers(self, joint: str) -> tuple[int | None, int | None]:
         """Sensors on parent and child of a joint; None: no sensor there answers."""
         segments = {j.name: (j.parent, j.child) for j in JOINTS}[joint]
-        first = {}
+        first: dict[str, int] = {}
         for sensor in self.alive:
             first.setdefault(self.layout.sensors[sensor].segment, sensor)
         parent, child = segments
@@ -88,6 +88,7 @@ def prepared(
     rate_hz: float,
     gyr: Float[Array, "n s 3"],
     acc: Float[Array, "n s 3"],
+    *,
     labels: Sequence[tuple[float, float, str]],
     heading: Float[Array, " s"],
     alive: Sequence[int],
@@ -119,6 +120,41 @@ def prepared(
         flat=flats[-1] if flats else rests[0],
         alive=tuple(alive),
     )
+
+
+def joined(parts: Sequence[Swings]) -> Swings:
+    """One course after the other, the glove having stayed on; flat hand and headings per part.
+
+    Attitudes of every part are in that part's own world, turned about the vertical against the
+    others': only what is relative within one instant counts.
+    """
+    first = parts[0]
+    offsets = np.concatenate([[0], np.cumsum([len(part.gyr) for part in parts])])
+    flats = [(i, p.flat) for i, p in enumerate(parts) if p.flat.stop > p.flat.start]
+    which, flat = flats[-1]
+    return Swings(
+        layout=first.layout,
+        rate_hz=first.rate_hz,
+        q_world_sensor=np.concatenate([part.q_world_sensor for part in parts]),
+        gyr=np.concatenate([part.gyr for part in parts]),
+        dgyr=np.concatenate([part.dgyr for part in parts]),
+        acc=np.concatenate([part.acc for part in parts]),
+        swings=tuple(
+            replace(
+                swing,
+                window=_shifted(swing.window, int(offset)),
+                moving=_shifted(swing.moving, int(offset)),
+            )
+            for offset, part in zip(offsets[:-1], parts, strict=True)
+            for swing in part.swings
+        ),
+        flat=_shifted(flat, int(offsets[which])),
+        alive=tuple(s for s in first.alive if all(s in part.alive for part in parts)),
+    )
+
+
+def _shifted(part: slice, by: int) -> slice:
+    return slice(part.start + by, part.stop + by)
 
 
 def smooth(
@@ -175,8 +211,8 @@ _STILL = ("static", "flat_hand", "rest")
 
 def _inner(start_s: float, end_s: float, rate_hz: float, count: int) -> slice:
     return slice(
-        max(0, round((start_s + _REST_EDGE_S) * rate_hz)),
-        min(count, round((end_s - _REST_EDGE_S) * rate_hz)),
+        max(0, round((start_s + _SETTLING_S) * rate_hz)),
+        min(count, round((end_s - _END_S) * rate_hz)),
     )
 
 

@@ -26,13 +26,11 @@ from handstudio.calibration.rigid_rotation import (
     BIAS_SD,
     CentreEstimate,
     Excitation,
-    Fitted,
-    Model,
     RigidRotation,
     excitation,
-    fit,
     skew,
 )
+from handstudio.calibration.robust_fit import Fitted, Model, fit
 from handstudio.errors import CalibrationError
 from handstudio.maths import so3
 

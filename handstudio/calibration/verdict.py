@@ -65,10 +65,12 @@ class Verdict(msgspec.Struct, frozen=True):
     Attributes:
         step: Name of the step, which is its label in the take.
         readings: What was measured, the most telling first.
+        over: Whether it has come to its end; until then it is not to be cut off, good as it is.
     """
 
     step: str
     readings: tuple[Reading, ...]
+    over: bool = True
 
     @property
     def failing(self) -> tuple[Reading, ...]:

@@ -9,23 +9,20 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
-import numpy as np
 import tyro
 
 from handstudio import __version__
-from handstudio.arrays import Array
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate import calibrate as calibrate_takes
+from handstudio.calibration.agreement import Agreement, agreement_of
 from handstudio.calibration.device import DeviceCalibration, Source, corrected
 from handstudio.calibration.mirrored import mirrored
 from handstudio.calibration.sensors import calibrate_sensors as sensors_of
-from handstudio.calibration.still import poses_of, still_intervals, turns_of
 from handstudio.calibration.subject import SubjectCalibration, decode
 from handstudio.commands.arguments import Json, Sessions
 from handstudio.commands.readings import show_verdicts, told
 from handstudio.errors import CalibrationError
 from handstudio.hand.skeleton import HandSide
-from handstudio.maths import so3
 from handstudio.recording.calibrations import (
     SubjectVersion,
     history,
@@ -47,7 +44,6 @@ from handstudio.recording.device_calibrations import (
 from handstudio.recording.library import sessions_folder
 from handstudio.recording.subjects import existing
 from handstudio.recording.take import Take, open_take
-from handstudio.samples import STANDARD_GRAVITY, ImuSamples
 from handstudio.setup import Setup, calibrated
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
@@ -85,6 +81,10 @@ def calibrate(
     if subject:
         calibration = msgspec.structs.replace(calibration, subject=subject)
     refused = _refused(found)
+    if not json:  # also where it then cannot be kept
+        show_verdicts(found.verdicts)
+        _show_subject(calibration)
+        _show_what_to_repeat(found, refused)
     kept = None
     if not dry_run and (anyway or not refused):
         kept = save_calibration(sessions_folder(sessions), calibration)
@@ -99,9 +99,6 @@ def calibrate(
             }
         )
     else:
-        show_verdicts(found.verdicts)
-        _show_subject(calibration)
-        _show_what_to_repeat(found, refused)
         _say_kept(kept, dry_run)
     return 1 if refused and not anyway else 0
 
@@ -137,7 +134,10 @@ def calibrate_sensors(
         software=f"handstudio {__version__}",
         source=[Source(take.header.name, take.sha256()) for take in opened],
     )
-    before, after = (_residuals(each) for each in (samples, corrected(samples, found, names)))
+    before, after = (agreement_of(each) for each in (samples, corrected(samples, found, names)))
+    if not json:
+        show_verdicts([verdict])
+        _show_sensors(found, names, before, after)
     kept = None
     if not dry_run and (anyway or verdict.ok):
         kept = save_device_calibration(sessions_folder(sessions), found)
@@ -153,8 +153,6 @@ def calibrate_sensors(
             }
         )
     else:
-        show_verdicts([verdict])
-        _show_sensors(found, names, before, after)
         _say_kept(kept, dry_run)
     return 0 if verdict.ok or anyway else 1
 
@@ -285,43 +283,6 @@ def _refuse_other_device(setup: Setup, errors: DeviceCalibration | None, file: s
         )
 
 
-class _Left(msgspec.Struct, frozen=True):
-    """What does not agree with gravity: its length [m/s²], and where turns carry it [deg], RMS."""
-
-    acc: float
-    gyr: float
-
-
-def _residuals(samples: ImuSamples) -> list[_Left]:
-    """Of every sensor, the gyroscope's bias at the rests taken off; NaN where it was never seen."""
-    stills = still_intervals(samples)
-    poses, turns = poses_of(samples, stills), turns_of(samples, stills)
-    out_of: list[_Left] = []
-    steps_s = np.diff(turns.time_s, axis=1)[..., None]
-    for sensor, up in enumerate(poses.acc):
-        usable = poses.usable[sensor]
-        bias = poses.gyr[sensor][usable].mean(axis=0) if usable.any() else np.zeros(3)
-        rate = turns.gyr[sensor] - bias
-        q = np.tile(so3.IDENTITY, (len(rate), 1))
-        for step in np.moveaxis(0.5 * (rate[:, 1:] + rate[:, :-1]) * steps_s, 1, 0):
-            q = so3.multiply(q, so3.exp(step))
-        carried = so3.rotate(so3.conjugate(q), up[:-1])
-        angle = np.rad2deg(_angle(carried, up[1:]))
-        both = usable[:-1] & usable[1:] & turns.usable[sensor]
-        length = np.linalg.norm(up, axis=-1) - STANDARD_GRAVITY
-        out_of.append(_Left(_rms(length[usable]), _rms(angle[both])))
-    return out_of
-
-
-def _angle(a: Array, b: Array) -> Array:
-    across = np.linalg.norm(np.cross(a, b), axis=-1)
-    return np.asarray(np.arctan2(across, np.sum(a * b, axis=-1)))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
-
-
 # --- judging --------------------------------------------------------------------------------------
 
 
@@ -428,7 +389,7 @@ def _say_kept(kept: Path | None, dry_run: bool) -> None:
 
 
 def _show_sensors(
-    found: DeviceCalibration, names: Sequence[str], before: list[_Left], after: list[_Left]
+    found: DeviceCalibration, names: Sequence[str], before: list[Agreement], after: list[Agreement]
 ) -> None:
     known = found.by_name
     rows = []

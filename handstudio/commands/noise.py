@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -11,28 +10,15 @@ import msgspec
 import numpy as np
 import tyro
 
-from handstudio.arrays import Array
-from handstudio.calibration.noise import (
-    LEAST_S,
-    AxisNoise,
-    Density,
-    Noise,
-    StaticRecording,
-    mean_of,
-    noise_of,
-)
+from handstudio.calibration.allan import AxisNoise, Density, mean_of
+from handstudio.calibration.noise import LEAST_S, Noise, StaticRecording, noise_of
 from handstudio.commands.arguments import Json
 from handstudio.errors import CalibrationError
 from handstudio.export.noise_picture import DEG, THESIS_WALK, THESIS_WHITE, G, draw
-from handstudio.recording.notes import load_notes
+from handstudio.recording.at_rest import static_recordings
 from handstudio.recording.take import Take, open_take
-from handstudio.samples import Gap, ImuSamples, Why
 from handstudio.shell import out, print_json, print_table, progress
 
-REST = "rest"
-"""Label of the stretches that are looked at; without any the whole take is."""
-
-_GAP_S = 1.0  # what is missing for longer ends a recording
 _READING = 0.4  # share of the time that reading takes
 
 
@@ -56,7 +42,7 @@ def noise(
     with progress("reading and averaging", quiet=json) as share:
         recordings: list[StaticRecording] = []
         for index, take in enumerate(opened):
-            recordings += _recordings(take, _part(share, _READING, index, len(opened)))
+            recordings += static_recordings(take, _part(share, _READING, index, len(opened)))
         long = [each for each in recordings if len(each.time_s) >= LEAST_S * each.rate_hz]
         found = noise_of(
             long or recordings, names, lambda done: share(_READING + (1.0 - _READING) * done)
@@ -95,60 +81,6 @@ def _part(
     share: Callable[[float], None], of: float, index: int, count: int
 ) -> Callable[[float], None]:
     return lambda done: share(of * (index + min(done, 1.0)) / count)
-
-
-def _recordings(take: Take, share: Callable[[float], None]) -> list[StaticRecording]:
-    """The stretches at rest, cut where much is missing; float32 holds every count of a sensor."""
-    labels = [label for label in load_notes(take.path).labels if label.label == REST]
-    spans = [(label.start_s, label.end_s) for label in labels] or [(0.0, math.inf)]
-    rate_hz = take.header.setup.rate_hz
-    whole_s = take.summary.duration_s if take.summary else math.inf
-    pieces: dict[tuple[int, int], list[tuple[Array, Array, Array]]] = {}
-    offset, piece, last = math.nan, 0, math.nan
-    for events in take.events():
-        for event in events:
-            match event:
-                case Gap(why=Why.RESTART, elapsed_us=elapsed):
-                    # the clock begins anew: go on after what came last
-                    offset, piece = last + max(elapsed * 1e-6, 1.0 / rate_hz), piece + 1
-                    last = math.nan
-                case ImuSamples() if len(event):
-                    clock = event.time_us * 1e-6
-                    if math.isnan(last):
-                        offset = clock[0] - (0.0 if math.isnan(offset) else offset)
-                    time_s = clock - offset
-                    piece += int(time_s[0] - last > _GAP_S)
-                    last = float(time_s[-1])
-                    _keep(pieces, piece, spans, time_s, event)
-                case _:
-                    pass
-        if not math.isnan(last):
-            share(last / whole_s)
-    return [_joined(parts, rate_hz) for parts in pieces.values()]
-
-
-def _keep(
-    pieces: dict[tuple[int, int], list[tuple[Array, Array, Array]]],
-    piece: int,
-    spans: Sequence[tuple[float, float]],
-    time_s: Array,
-    samples: ImuSamples,
-) -> None:
-    silent = ~samples.valid[..., None]
-    for index, (start, end) in enumerate(spans):
-        inside = (time_s >= start) & (time_s <= end)
-        if inside.any():
-            gyr, acc = (
-                np.where(silent, np.nan, each)[inside].astype(np.float32)
-                for each in (samples.gyr, samples.acc)
-            )
-            pieces.setdefault((index, piece), []).append((time_s[inside], gyr, acc))
-
-
-def _joined(parts: list[tuple[Array, Array, Array]], rate_hz: float) -> StaticRecording:
-    time_s, gyr, acc = (np.concatenate(each) for each in zip(*parts, strict=True))
-    parts.clear()  # an hour of twenty sensors is not held twice
-    return StaticRecording(time_s, gyr, acc, rate_hz)
 
 
 def _show(found: Noise) -> None:

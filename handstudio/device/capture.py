@@ -17,11 +17,13 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import msgspec
+import numpy as np
 
-from handstudio import pipeline
+from handstudio import alignment, pipeline
 from handstudio.device.addresses import open_source
 from handstudio.device.health import HealthKeeper
 from handstudio.device.host_clock import now_ns
+from handstudio.device.known import Known
 from handstudio.device.line import READ_S, Line, stranger
 from handstudio.device.orders import (
     Ask,
@@ -34,6 +36,9 @@ from handstudio.device.orders import (
     Report,
     ResetHeading,
     SetHand,
+    SetHeading,
+    SetSensors,
+    SetSubject,
     ShareSamples,
     StartTake,
     StopTake,
@@ -42,7 +47,7 @@ from handstudio.device.orders import (
 from handstudio.device.recorder import Recorder
 from handstudio.device.source import SourceLost
 from handstudio.errors import DeviceError, HandstudioError
-from handstudio.pipeline import Motion
+from handstudio.pipeline import Doubt, Motion
 from handstudio.protocol.packets import (
     Command,
     Description,
@@ -88,6 +93,8 @@ class Capture:
         self._reports: deque[Report] = deque(maxlen=100)
         self._closing: list[Recorder] = []
         self._wanted: _Wanted | None = None
+        self._known = Known()
+        self._waiting: Known | None = None  # what is known since the take began
         self._line: Line | None = None
         self._stream = EventStream("handstudio-1", None)
         self._state: pipeline.State | None = None
@@ -179,8 +186,14 @@ class Capture:
                 self._pass_on(order)
             case ShareSamples(on=on):
                 self._samples = deque(maxlen=HISTORY) if on else None
-            case ResetHeading():
-                pass
+            case SetSubject(calibration=calibration):
+                self._learn(replace(self._newly_known, subject=calibration))
+            case SetSensors(errors=errors):
+                self._learn(replace(self._newly_known, sensors=errors))
+            case SetHeading(headings=headings):
+                self._turn_to(headings)
+            case ResetHeading(sensor=sensor):
+                self._reset_heading(sensor)
 
     def _let_go(self) -> None:
         self._stop_take()
@@ -190,6 +203,7 @@ class Capture:
     def _connect(self, order: Connect) -> None:
         self.newest = Newest(Phase.CONNECTING, order.address)
         self._state, self._health = None, HealthKeeper()
+        self._known = replace(self._known, heading_rad=())
         try:
             self._stream = EventStream(order.decoder, None)
         except HandstudioError as error:
@@ -379,6 +393,7 @@ class Capture:
         order = wanted.order
         try:
             setup = for_device(description, order.decoder, order.hand, order.side)
+            setup, unfit = self._known.on(setup)
         except HandstudioError as error:
             self._give_up(error)
             return
@@ -386,16 +401,21 @@ class Capture:
             self._put_off(setup)
             return
         first = not line.introduced
+        if first and unfit is not None:
+            self._reports.append(unfit)
         line.introduced = wanted.was_there = True
         if setup != self.newest.setup:
             self._stream.ranges = Ranges.of(description)
-            self._state = pipeline.begin(setup)
-            self._history.clear()
-            self._health.meet(setup)
+            self._begin_anew(setup)
         self.newest = replace(self.newest, description=description, setup=setup, problem=None)
         if first:
             line.moved = time.monotonic()
             self._ask(Command.START)
+
+    def _begin_anew(self, setup: Setup) -> None:
+        self._state = pipeline.begin(setup)
+        self._history.clear()
+        self._health.meet(setup)
 
     def _put_off(self, other: Setup) -> None:
         """Another device, or other settings, in the middle of a take: not into the same file."""
@@ -457,6 +477,63 @@ class Capture:
         except SourceLost:
             self._lose()
 
+    # --- what is known of wearer and glove ------------------------------------------------------
+
+    @property
+    def _newly_known(self) -> Known:
+        return self._waiting or self._known
+
+    def _learn(self, known: Known) -> None:
+        """Use calibrations from now on; a take keeps those that it began with."""
+        setup = self.newest.setup
+        if setup is None:
+            self._known = known
+            return
+        other, unfit = known.on(setup)
+        if self.newest.recorder is not None:
+            self._waiting = known
+            if other != setup:
+                self._reports.append(_calibration_waits())
+            return
+        self._known = known
+        if unfit is not None:
+            self._reports.append(unfit)
+        if other.sensors != setup.sensors:  # what the filter remembers is of other readings
+            self._begin_anew(other)
+        if other != setup:
+            self.newest = replace(self.newest, setup=other)
+
+    def _turn_to(self, headings: tuple[float, ...]) -> None:
+        """Headings decide nothing the pipeline remembers: its state goes on."""
+        setup = self.newest.setup
+        if self.newest.recorder is not None:
+            self._reports.append(_heading_stays())
+        elif setup is not None:
+            self._known = replace(self._known, heading_rad=tuple(map(float, headings)))
+            after, _ = self._known.on(setup)
+            motion = self.newest.motion
+            if motion is not None:
+                motion = pipeline.turned(alignment.between(setup, after), motion)
+            self.newest = replace(self.newest, setup=after, motion=motion)
+
+    def _reset_heading(self, sensor: str | None) -> None:
+        setup, motion = self.newest.setup, self.newest.motion
+        if self.newest.recorder is not None:
+            self._reports.append(_heading_stays())
+            return
+        if setup is None or motion is None:
+            self._reports.append(
+                DeviceError("No hand is shown yet.", "Connect a glove, then reset the heading.")
+            )
+            return
+        placed = (motion.doubt[-1] & np.uint8(Doubt.UNPLACED)) == 0
+        try:
+            turned = alignment.reset(setup, motion.q_world_sensor[-1], sensor, placed)
+        except HandstudioError as error:
+            self._reports.append(error)
+            return
+        self._turn_to(turned.heading_rad)
+
     # --- the take -------------------------------------------------------------------------------
 
     def _set_hand(self, hand: HandModel) -> None:
@@ -497,6 +574,9 @@ class Capture:
         recorder.stop(self._health.summary(recorder.seconds, now_ns()))
         self._closing.append(recorder)
         self.newest = replace(self.newest, recorder=None)
+        if self._waiting is not None:
+            known, self._waiting = self._waiting, None
+            self._learn(known)
 
     def _collect(self) -> None:
         """Report takes that were closed; stop one whose file can no longer be written."""
@@ -506,6 +586,17 @@ class Capture:
         for done in [recorder for recorder in self._closing if recorder.finished]:
             self._closing.remove(done)
             self._reports.append(done.failure or TakeDone(done.path))
+
+
+def _calibration_waits() -> DeviceError:
+    return DeviceError(
+        "Another calibration is there: the take keeps the one it began with.",
+        "The other one is used once the take is over.",
+    )
+
+
+def _heading_stays() -> DeviceError:
+    return DeviceError("The heading stays while a take is recorded.", "Stop the take first.")
 
 
 def _take_waits(mine: str, other: str) -> DeviceError:

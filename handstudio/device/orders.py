@@ -7,6 +7,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.health import HealthView
 from handstudio.device.recorder import Recorder
 from handstudio.errors import HandstudioError
@@ -49,6 +51,23 @@ class SetHand:
 
 
 @dataclass(frozen=True, slots=True)
+class SetSubject:
+    """The wearer's calibration, from now on; None: mean proportions.
+
+    While a take is recorded it waits for its end, as `SetSensors` does.
+    """
+
+    calibration: SubjectCalibration | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetSensors:
+    """The errors of a device's sensors, from now on; None: as they were shipped."""
+
+    errors: DeviceCalibration | None
+
+
+@dataclass(frozen=True, slots=True)
 class StartTake:
     """Record from now on."""
 
@@ -85,21 +104,31 @@ class ShareSamples:
 
 @dataclass(frozen=True, slots=True)
 class ResetHeading:
-    """Take the heading anew, of one sensor by its name or, with None, of all."""
+    """Take the heading anew, the hand lying flat now; of one sensor or, with None, of all."""
 
     sensor: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetHeading:
+    """Turn every sensor's orientation about the vertical by so much [rad]; empty: not at all."""
+
+    headings: tuple[float, ...]
 
 
 Order: TypeAlias = (
     Connect
     | Disconnect
     | SetHand
+    | SetSubject
+    | SetSensors
     | StartTake
     | StopTake
     | Ask
     | NotePage
     | ShareSamples
     | ResetHeading
+    | SetHeading
 )
 
 

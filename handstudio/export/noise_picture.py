@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from handstudio.calibration.noise import AxisNoise, Noise, mean_of
+from handstudio.calibration.allan import AxisNoise, mean_of
+from handstudio.calibration.noise import Noise
 from handstudio.errors import CalibrationError
 from handstudio.samples import STANDARD_GRAVITY
 

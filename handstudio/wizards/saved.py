@@ -9,7 +9,7 @@ import msgspec
 from handstudio.calibration.course import Step
 from handstudio.calibration.verdict import Verdict
 from handstudio.errors import CalibrationError
-from handstudio.wizards.course import Course, Outcome, Phase, Standing
+from handstudio.wizards.state import Course, Outcome, Phase, Standing
 
 FORMAT = 1
 

@@ -11,15 +11,9 @@ from hypothesis import strategies as st
 
 from handstudio.analysis.hand_error import heading_scatter
 from handstudio.calibration.attitude import attitude
-from handstudio.calibration.heading import (
-    CALIBRATED,
-    HeadingAlignment,
-    align,
-    at_peak,
-    compass_headings,
-    robust_mean,
-    shared_headings,
-)
+from handstudio.calibration.heading import HeadingAlignment, align, at_peak
+from handstudio.calibration.heading_fit import CALIBRATED
+from handstudio.calibration.level_headings import compass_headings, robust_mean, shared_headings
 from handstudio.errors import CalibrationError
 from handstudio.layout import glove
 from handstudio.maths import so3

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.sensor_errors import imu_tk
+from benchmarks.imu_tk import imu_tk
 
 
 @pytest.mark.real

@@ -6,15 +6,8 @@ import allantools
 import numpy as np
 import pytest
 
-from handstudio.calibration.noise import (
-    LEAST_S,
-    Noise,
-    StaticRecording,
-    _fitted,
-    _plan,
-    mean_of,
-    noise_of,
-)
+from handstudio.calibration.allan import fitted, mean_of, plan_of
+from handstudio.calibration.noise import LEAST_S, Noise, StaticRecording, noise_of
 from handstudio.errors import CalibrationError
 from handstudio.layout import glove
 from handstudio.simulation.imperfections.strengths import parse
@@ -92,11 +85,11 @@ def test_an_absent_walk_is_not_distinct_and_its_bound_holds():
 
 def test_a_walk_that_never_rises_above_the_white_noise_is_not_distinct():
     """Beyond chance, after hours, but no slope of +1/2: the curve is still falling at its end."""
-    plan = _plan((144_000,), 2.0)
+    plan = plan_of((144_000,), 2.0)
     tau = (plan.m / plan.rate_hz)[plan.first :]
-    white, walk, _ = _fitted(tau, 1.0 / tau + 1e-9 * tau / 3.0, plan)
+    white, walk, _ = fitted(tau, 1.0 / tau + 1e-9 * tau / 3.0, plan)
     assert (white.distinct, walk.distinct, walk.low) == (True, False, 0.0)
-    _, walk, _ = _fitted(tau, 1.0 / tau + 1e-6 * tau / 3.0, plan)
+    _, walk, _ = fitted(tau, 1.0 / tau + 1e-6 * tau / 3.0, plan)
     assert walk.distinct
     assert walk.value == pytest.approx(1e-3)
 
@@ -104,7 +97,7 @@ def test_a_walk_that_never_rises_above_the_white_noise_is_not_distinct():
 def test_degrees_of_freedom_are_those_of_allantools():
     """Two ways to one number: our covariance of the variances, and Greenhall's approximation."""
     n = 36_000
-    plan = _plan((n,), 10.0)
+    plan = plan_of((n,), 10.0)
     tau = plan.m / plan.rate_hz
     for alpha, expected, covariance in (
         (0, 1.0 / tau, plan.white),

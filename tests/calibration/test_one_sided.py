@@ -7,7 +7,6 @@ import pytest
 
 from handstudio.calibration.one_sided import centre
 from handstudio.calibration.rigid_rotation import (
-    UNSEEN_SD_M,
     RigidRotation,
     free_of_gravity,
     gamma,
@@ -15,6 +14,7 @@ from handstudio.calibration.rigid_rotation import (
     skew,
     smoothed,
 )
+from handstudio.calibration.robust_fit import UNSEEN_SD_M
 from handstudio.errors import CalibrationError
 from handstudio.maths import so3
 

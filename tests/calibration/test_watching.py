@@ -72,6 +72,12 @@ def seen(name: str, manner: str = "", **how: object) -> Verdict:
     return observe(STEP[name], rest, read[name], LAYOUT)
 
 
+def one_after_another(*pieces: ImuSamples) -> ImuSamples:
+    """At 100 Hz, as if without a break."""
+    joined = [np.concatenate([getattr(p, name) for p in pieces]) for name in ImuSamples.__slots__]
+    return ImuSamples(np.arange(len(joined[0])) * 10_000, *joined[1:])
+
+
 def reading(verdict: Verdict, what: str, about: str | None = None) -> Reading:
     return next(r for r in verdict.readings if r.what == what and about in (None, r.about))
 
@@ -306,6 +312,32 @@ def test_a_step_stops_by_itself_when_it_is_good_and_long_enough():
     assert enough(good, step, step.least_s)
     assert not enough(bad, step, step.least_s)
     assert enough(bad, step, step.most_s)
+
+
+def test_a_turn_does_not_stop_by_itself_before_the_rig_is_laid_back():
+    turned, rest = parts("heading_rotation")["heading_rotation"], parts("static")["static"]
+    for after in (rest, turned):  # some lift it more than once
+        whole = one_after_another(turned, after)
+        verdicts = {upto: observe(TURN, rest, whole[:upto], LAYOUT) for upto in range(10, 240, 5)}
+        first = next(upto for upto, each in verdicts.items() if enough(each, TURN, upto / 100.0))
+        assert 0.88 * len(turned) <= first <= len(turned) + 20
+    assert verdicts[160].ok  # all there is to see of it, but for its end
+    assert not verdicts[160].over
+
+
+def test_a_rig_that_is_held_up_is_not_laid_back():
+    up, rest = parts("heading_rotation")["heading_rotation"][:80], parts("static")["static"]
+    assert not observe(TURN, rest, one_after_another(up, rest), LAYOUT).over
+
+
+@pytest.mark.parametrize("name", ["index_mcp:flexion", "elbow:flexion", "thumb_cmc:abduction"])
+def test_stillness_around_a_swing_does_not_make_it_slow(name):
+    read = parts(name)
+    done, rest = read[name], read["static"]
+    usual = reading(seen(name), "pace").value
+    for around in ((done, rest, rest), (rest, rest, done), (done, rest, done[:80])):
+        verdict = observe(STEP[name], rest, one_after_another(*around), LAYOUT)
+        assert reading(verdict, "pace").value == pytest.approx(usual, rel=0.02)
 
 
 def test_a_look_at_the_result_lasts_as_long_as_somebody_looks():

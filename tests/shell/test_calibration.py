@@ -208,6 +208,16 @@ def test_what_cannot_be_calibrated_says_why(here, monkeypatch, take, sessions):
     assert said.err.splitlines() == ["Nothing swings in 2 takes.", "Record them."]
 
 
+def test_what_was_found_is_told_also_where_it_cannot_be_kept(here, found, take, sessions):
+    found()
+    sessions.write_text("four years of work")
+    said = here("calibrate", take, "--sessions", sessions)
+    assert said.code == 1
+    assert "swung by 84 deg" in said.out
+    assert "cannot be written" in said.err
+    assert sessions.read_text() == "four years of work"
+
+
 @pytest.mark.parametrize("command", ["calibrate", "calibrate-sensors"])
 def test_without_a_take_it_says_how(here, command):
     said = here(command)

@@ -121,12 +121,12 @@ class Solver:
 
     share_done = 0.5
 
-    def __init__(self, outcome: Calibrated | Exception | None) -> None:
-        self.outcome, self.asked = outcome, list[Path]()
+    def __init__(self, outcome: Any) -> None:
+        self.outcome, self.asked, self.course = outcome, list[Path](), ""
 
-    def calibrate(self, paths: Sequence[Path], sessions: Path) -> Future[Calibrated]:
-        self.asked = list(paths)
-        future: Future[Calibrated] = Future()
+    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Any]:
+        self.course, self.asked = course, list(paths)
+        future: Future[Any] = Future()
         if isinstance(self.outcome, Exception):
             future.set_exception(self.outcome)
         elif self.outcome is not None:
@@ -410,7 +410,7 @@ def calibrated(*to_repeat: str, plausible: float = 0.3) -> Calibrated:
     return Calibrated(one, (), to_repeat)
 
 
-def finished(guided: Guided, outcome: Calibrated | Exception | None) -> State:
+def finished(guided: Guided, outcome: Any, course: str = "hand") -> State:
     guided.studio._workshop.jobs = Solver(outcome)  # type: ignore[assignment]
     guided.begin()
     guided.rests()

@@ -19,10 +19,6 @@ from handstudio.layout import glove
 from handstudio.samples import ImuSamples
 from handstudio.wizards import saved, window
 from handstudio.wizards.course import (
-    COUNT_S,
-    READ_S,
-    REST_MORE_S,
-    SETTLE_S,
     Accept,
     Course,
     Cue,
@@ -42,6 +38,8 @@ from handstudio.wizards.course import (
     advance,
     begin,
 )
+from handstudio.wizards.sensed import READ_S, REST_MORE_S, SETTLE_S
+from handstudio.wizards.state import COUNT_S
 
 RATE_HZ = 100.0
 LAYOUT = glove("right", ["SN1", "SN11"])

@@ -1,0 +1,42 @@
+"""What is known of wearer and glove beside what the device says of itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.subject import SubjectCalibration
+from handstudio.errors import CalibrationError
+from handstudio.setup import Setup, calibrated
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """Calibrations and headings that the next setup is to have.
+
+    Attributes:
+        subject: Of the wearer; None: mean proportions.
+        sensors: Of a device's sensors; None: as they were shipped.
+        heading_rad: One a sensor; empty: as the sensors say.
+    """
+
+    subject: SubjectCalibration | None = None
+    sensors: DeviceCalibration | None = None
+    heading_rad: tuple[float, ...] = ()
+
+    def on(self, setup: Setup) -> tuple[Setup, CalibrationError | None]:
+        """A setup with all of it that fits, and why the wearer's calibration is not in it.
+
+        Sensors of another device and headings of other sensors are left out, nothing is amiss.
+        """
+        serial = setup.device.serial_number if setup.device is not None else ""
+        mine = self.sensors is not None and self.sensors.device == serial
+        sensors = self.sensors if mine else None
+        fits = len(self.heading_rad) == len(setup.layout.sensors)
+        setup = msgspec.structs.replace(setup, heading_rad=self.heading_rad if fits else ())
+        try:
+            return calibrated(setup, subject=self.subject, sensors=sensors), None
+        except CalibrationError as error:
+            return calibrated(setup, sensors=sensors), error
