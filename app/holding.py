@@ -8,14 +8,19 @@ from pathlib import Path
 
 from app.guided import InUse
 from app.state import State
-from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.capture import Capture
 from handstudio.device.orders import SetSensors, SetSubject
 from handstudio.errors import CalibrationError, HandstudioError
 from handstudio.hand.skeleton import HandSide
-from handstudio.recording.calibrations import Loaded, history, load_calibration, restore
-from handstudio.recording.device_calibrations import load_device_calibration
+from handstudio.recording.calibrations import (
+    Loaded,
+    LoadedSubject,
+    history,
+    load_calibration,
+    restore,
+)
+from handstudio.recording.device_calibrations import LoadedDevice, load_device_calibration
 
 
 @dataclass
@@ -41,8 +46,8 @@ class Holder:
     def load(self) -> None:
         """Read the files again, and use what they hold."""
         (code, side, serial), before = self._of, self.in_use
-        subject = Loaded[SubjectCalibration](None)
-        sensors = Loaded[DeviceCalibration](None)
+        subject: LoadedSubject = Loaded(None)
+        sensors: LoadedDevice = Loaded(None)
         older: tuple[str, ...] = ()
         if code and side is not None:
             try:

@@ -104,16 +104,16 @@ def _head(course: Course) -> str:
 
 def _body(course: Course) -> str:  # noqa: PLR0911 - a list
     """What the phase has to show, beside the sentence that stays."""
-    sentence = sentence(sentence_of(course.step))
+    asked = sentence(sentence_of(course.step))
     match course.phase:
         case Phase.INTRO:
-            return big("●", GREY, sentence + small(_introduction(course)))
+            return big("●", GREY, asked + small(_introduction(course)))
         case Phase.COUNTDOWN:
-            return big(str(course.count), AMBER, sentence + small(_trouble(course)))
+            return big(str(course.count), AMBER, asked + small(_trouble(course)))
         case Phase.RESTING:
             return big("‖", AMBER, sentence(_("Keep still …")) + _bars(course.live))
         case Phase.DOING:
-            return big(_clock(course), GREEN, sentence + _bars(course.live))
+            return big(_clock(course), GREEN, asked + _bars(course.live))
         case Phase.VERDICT:
             return _verdict(course.step, course.outcome)
         case Phase.AWAY:
