@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -25,7 +25,6 @@ import tyro
 from benchmarks import thesis
 from benchmarks.accuracy_report import picture, show
 from benchmarks.trials import Calibration, Figures, Trial, run
-from handstudio.errors import SetupError
 from handstudio.shell import progress
 from handstudio.simulation.imperfections.strengths import (
     GROUPS,
@@ -64,7 +63,7 @@ def main(
     imperfections: str = "typical",
     soft_tissue: bool = True,
     filter: str = "vqf",
-    calibration: Literal["truth", "nominal", "own"] = "truth",
+    calibration: Calibration = "truth",
     development: bool = False,
     budget: bool = True,
     thesis_experiment: bool = True,
@@ -80,17 +79,16 @@ def main(
         soft_tissue: Let sensors move on skin.
         filter: Which filter follows.
         calibration: What the pipeline is told of hand and mounting: truth, or nothing but the
-            hand's length (nominal).
+            hand's length (nominal), or what a course before found (own).
         development: People and seeds that parameters may be chosen on, not those reported.
         budget: Try every imperfection alone, and all without it.
         thesis_experiment: Repeat the thesis's experiment.
         picture_file: Where to draw the figures (PNG or SVG).
     """
-    known = _calibration(calibration)
     strengths = parse(imperfections if soft_tissue else f"{imperfections},-soft_tissue")
     people = (DEVELOPMENT if development else REPORTING)[:subjects]
     seeds = 0 if development else 10_000  # kept apart as the people are
-    trials = [Trial(n, motions, strengths, seeds + n, filter, known) for n in people]
+    trials = [Trial(n, motions, strengths, seeds + n, filter, calibration) for n in people]
     print(f"calibration: {calibration}; filter: {filter}; imperfections: {tell(strengths)}")
     found: dict[str, Any] = {
         "calibration": calibration,
@@ -150,18 +148,10 @@ def summed(figures: Sequence[Figures]) -> dict[str, Any]:
             "hand": float(np.mean([f.tips_hand for f in figures])),
         },
         "sensor_mm": {"elbow": _means([figure.places_elbow for figure in figures])},
-        "joint_centre_mm": None,  # nothing is calibrated yet: they are given
+        "joint_centre_mm": None,  # of a calibration: benchmarks.calibration
         "link_length_mm": None,
         "heading_sd_deg": float(np.mean([f.heading_sd_deg for f in figures])),
     }
-
-
-def _calibration(asked: str) -> Calibration:
-    if asked == "own":
-        raise SetupError(
-            "There is no calibration of our own yet.", "Choose truth or nominal: --calibration."
-        )
-    return "nominal" if asked == "nominal" else "truth"
 
 
 def _budget(like: Trial, people: Sequence[int]) -> dict[str, Any]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import msgspec
 import numpy as np
 
-from benchmarks.trials import RATE_HZ
 from handstudio.arrays import Array
 from handstudio.calibration.chain_tree import USUAL, Priors
 from handstudio.calibration.device import DeviceCalibration, corrected
@@ -31,6 +31,7 @@ from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.worn import begin, sense, wear
 
+RATE_HZ = 100
 COURSE = "calibration"
 TUMBLE = "quick_start+tumble"
 
@@ -67,6 +68,15 @@ class Errors(msgspec.Struct, frozen=True):
 
 def run(asked: Asked) -> Errors:
     """Let a person do the course, calibrate, compare."""
+    hand, _, truth, labels = calibrated_hand(asked)
+    return _compared(asked.person, hand, truth, labels)
+
+
+Labelled: TypeAlias = list[tuple[float, float, str]]
+
+
+def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Truth, Labelled]:
+    """Let a person do the course: the hand and the sensors as found, and what was true."""
     someone = subject(asked.person)
     known = _sensors(someone, asked) if asked.sensors_first else None
     trajectory = perform(COURSE, Actor(someone, asked.seed, material()))
@@ -93,7 +103,7 @@ def run(asked: Asked) -> Errors:
         alive=range(len(names)),
     )
     hand = found(swings, someone.side, someone.hand_length_m, asked.priors)
-    return _compared(asked.person, hand, truth, labels)
+    return hand, known, truth, labels
 
 
 def _sensors(someone: Subject, asked: Asked) -> DeviceCalibration:
@@ -122,9 +132,7 @@ def _columns(parts: Sequence[object], names: Sequence[str]) -> list[list[Array]]
     return [[getattr(part, name) for part in parts] for name in names]
 
 
-def _compared(
-    person: int, hand: Found, truth: Truth, labels: list[tuple[float, float, str]]
-) -> Errors:
+def _compared(person: int, hand: Found, truth: Truth, labels: Labelled) -> Errors:
     swings = hand.swings
     flat = (swings.flat.start + swings.flat.stop) // 2
     on = segment_indices(swings.layout)
@@ -171,7 +179,7 @@ def _part(start_s: float, end_s: float) -> slice:
     return slice(round(start_s * RATE_HZ), round(end_s * RATE_HZ))
 
 
-def _true_axis(truth: Truth, k: int, flat: int, labels: list[tuple[float, float, str]]) -> Array:
+def _true_axis(truth: Truth, k: int, flat: int, labels: Labelled) -> Array:
     """Principal axis of a joint's true flexion, in its segment at the flat hand."""
     parts = [_part(a, b) for a, b, name in labels if name == f"{JOINTS[k].name}:flexion"]
     rel = [_relative(truth, k, part) for part in parts]
@@ -188,9 +196,7 @@ def _relative(truth: Truth, k: int, part: slice) -> Array:
     return so3.multiply(so3.conjugate(truth.q_world_segment[part, PARENTS[k]]), q)
 
 
-def _mean_centre(
-    truth: Truth, k: int, labels: list[tuple[float, float, str]], axis: Array
-) -> tuple[Array, Array]:
+def _mean_centre(truth: Truth, k: int, labels: Labelled, axis: Array) -> tuple[Array, Array]:
     """The point fixed in both segments that moves least in a joint's true swings.
 
     In the child's frame and in the parent's. Rolling joints and axes that pass by one another have

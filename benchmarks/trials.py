@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
+from benchmarks.calibrated import Asked, calibrated_hand
 from handstudio import pipeline
 from handstudio.analysis.hand_error import (
     HandPoints,
@@ -22,12 +23,16 @@ from handstudio.analysis.hand_error import (
     sensor_errors,
 )
 from handstudio.arrays import Array
+from handstudio.calibration.device import corrected
+from handstudio.calibration.heading import CALIBRATED
+from handstudio.calibration.quick_start import quick_start
 from handstudio.hand.angles import hand_angles
-from handstudio.hand.skeleton import SEGMENTS, HandSide
+from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
 from handstudio.kinematics import HandFit, angles_of, fit_of, measured_angles, pose_of
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.recording.material import material
+from handstudio.samples import ImuSamples
 from handstudio.setup import HandModel, Setup, filter_named
 from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import Imperfections
@@ -39,8 +44,9 @@ from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.worn import Worn, begin, sense, wear
 
-Calibration: TypeAlias = Literal["truth", "nominal"]
-"""What the pipeline is told of hand and mounting: all of it, or nothing but the hand's length."""
+Calibration: TypeAlias = Literal["truth", "nominal", "own"]
+"""What the pipeline is told of hand and mounting: all of it; nothing but the hand's length; or what
+a course before, in the same donning, found of them, of the sensors, and of headings."""
 
 RATE_HZ = 100
 _X_ALONG_BONE = so3.about_z(0.5 * np.pi)
@@ -97,6 +103,7 @@ class Followed:
     truth: Truth
     motion: pipeline.Motion
     compared: Array = field(repr=False)  # which instants
+    own: HandFit | None = None  # the hand as a course before found it
 
     @property
     def fit(self) -> HandFit:
@@ -128,20 +135,46 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
         filter=filter_named(trial.filter),
         hand=HandModel(hand_length_m=someone.hand_length_m),
     )
-    motions, truths = [], []
-    state, wearing = pipeline.begin(setup), begin(worn)
+    motions, truths, runs = [], [], []
+    wearing = begin(worn)
     count = round(performed.duration_s * RATE_HZ)
     for start in range(0, count, _BLOCK):
         index = np.arange(start, min(start + _BLOCK, count))
         sensed, wearing = sense(worn, wearing, performed, index * (1_000_000 // RATE_HZ), RATE_HZ)
-        motion, state = pipeline.run(setup, state, [sensed.samples])
-        motions.append(motion)
+        runs.append(sensed.samples)
         truths.append(sensed.truth)
+    own = None
+    if trial.calibration == "own":
+        setup, own = _own(trial, setup, runs)
+    state = pipeline.begin(setup)
+    for samples in runs:
+        motion, state = pipeline.run(setup, state, [samples])
+        motions.append(motion)
     truth = _joined(truths)
     time_s = truth.time_us * 1e-6
-    return Followed(
-        worn, setup, performed, truth, pipeline.join(motions), time_s >= _begins_s(performed)
+    compared = time_s >= _begins_s(performed)
+    return Followed(worn, setup, performed, truth, pipeline.join(motions), compared, own)
+
+
+def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, HandFit]:
+    """What a course of the same person, in the same donning, found; headings by the quick start."""
+    hand, known, _, _ = calibrated_hand(Asked(trial.person, trial.seed, trial.imperfections))
+    frames = hand.frames
+    skeleton = Skeleton(
+        trial.side, frames.t_parent_joint, frames.q_parent_rest, frames.t_distal_tip
     )
+    q_sensor_segment = np.tile(so3.IDENTITY, (len(setup.layout.sensors), 1))
+    for segment, sensor in enumerate(frames.driver):
+        if sensor is not None:
+            q_sensor_segment[sensor] = frames.q_sensor_segment[segment]
+    setup = msgspec.structs.replace(setup, sensors=known)
+    names = ImuSamples.__slots__
+    opening = ImuSamples(*(np.concatenate([getattr(r, n) for r in runs[:2]]) for n in names))
+    if known is not None:
+        opening = corrected(opening, known, setup.layout.names)
+    alignment, _ = quick_start(opening, setup.layout.names, tolerances=CALIBRATED)
+    setup = msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
+    return setup, HandFit(skeleton, q_sensor_segment)
 
 
 def performance(someone: Subject, motion: str, seed: int) -> Trajectory:
@@ -152,7 +185,7 @@ def performance(someone: Subject, motion: str, seed: int) -> Trajectory:
 def compare(followed: Followed, calibration: Calibration) -> Figures:
     """Hold what came out against what was true."""
     part, truth = followed.compared, followed.truth
-    fit = followed.fit if calibration == "truth" else fit_of(followed.setup)
+    fit = followed.fit if calibration == "truth" else followed.own or fit_of(followed.setup)
     motion = _of(followed.motion, part)
     sensors = sensor_errors(
         followed.setup.layout.names, truth.q_world_sensor[part], motion.q_world_sensor

@@ -22,6 +22,7 @@ from handstudio.commands import calibration as calibration_commands
 from handstudio.commands import keeping
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
+from handstudio.commands.checking import check
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
 from handstudio.device import find
@@ -341,6 +342,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "motions": virtual_commands.motions,
     "calibrate": calibration_commands.calibrate,
     "calibrations": calibration_commands.calibrations,
+    "check": check,
     "mirror": calibration_commands.mirror,
     "calibrate-sensors": calibration_commands.calibrate_sensors,
     "noise": noise,

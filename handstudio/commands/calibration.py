@@ -241,11 +241,20 @@ def chosen(setup: Setup, calibration: str | None, sensors: str | None) -> Setup:
         return setup
     subject, errors = setup.subject, setup.sensors
     if calibration is not None:
-        subject = None if calibration == _NONE else decode(_bytes(calibration), calibration)
+        subject = None if calibration == _NONE else read_calibration(calibration)
     if sensors is not None:
         errors = None if sensors == _NONE else named(_bytes(sensors), Path(sensors))
         _refuse_other_device(setup, errors, sensors)
     return calibrated(setup, subject=subject, sensors=errors)
+
+
+def read_calibration(file: str) -> SubjectCalibration:
+    """The subject calibration in a file.
+
+    Raises:
+        CalibrationError: there is none in it.
+    """
+    return decode(_bytes(file), file)
 
 
 # --- reading --------------------------------------------------------------------------------------

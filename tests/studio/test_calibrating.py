@@ -9,33 +9,49 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
+import msgspec
 import numpy as np
 import pytest
 
 from app import courses, intents
 from app.calibrating import manner_of, performs
+from app.solving import SensorsFound
 from app.sounds import Sound
 from app.state import State
 from app.studio import Studio
+from app.views import calibration as calibration_view
 from app.views import course as view
 from app.views import recording as recording_view
+from app.views.answers import answer_of
 from app.views.steps import failing_of, sentence_of, title_of
 from handstudio.calibrate import Calibrated
+from handstudio.calibration.agreement import Agreement
+from handstudio.calibration.allan import AxisNoise, Density
 from handstudio.calibration.course import COURSES, SWINGS, Step
+from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors
+from handstudio.calibration.heading import HeadingAlignment
+from handstudio.calibration.noise import Noise, SensorNoise
 from handstudio.calibration.subject import Segment, SubjectCalibration
 from handstudio.calibration.verdict import Reading, Verdict, What
+from handstudio.check import Checked
 from handstudio.device.orders import (
     Ask,
     Newest,
     Phase,
     ResetHeading,
+    SetHeading,
+    SetSensors,
+    SetSubject,
     ShareSamples,
     StartTake,
     StopTake,
     TakeDone,
 )
 from handstudio.errors import CalibrationError, TakeError
+from handstudio.layout import glove
 from handstudio.protocol.commands import PERFORM
+from handstudio.recording.calibrations import save_calibration
+from handstudio.recording.device_calibrations import save_device_calibration
 from handstudio.recording.notes import load_notes, notes_path
 from handstudio.samples import ImuSamples
 from handstudio.simulation.glove import description
@@ -71,8 +87,8 @@ class Guided:
         self.studio, self.capture = studio, capture
         self.at_us, self.heard = 0, list[Sound]()
 
-    def begin(self, *, anew: bool = False) -> State:
-        state = after(self.studio, intents.BeginCourse("hand", anew=anew))
+    def begin(self, course: str = "hand", *, anew: bool = False) -> State:
+        state = after(self.studio, intents.BeginCourse(course, anew=anew))
         started = [order for order in self.capture.orders if isinstance(order, StartTake)]
         self.recorder = recording(self.capture, started[-1].path)
         self.recorder.first_us = self.at_us
@@ -412,7 +428,7 @@ def calibrated(*to_repeat: str, plausible: float = 0.3) -> Calibrated:
 
 def finished(guided: Guided, outcome: Any, course: str = "hand") -> State:
     guided.studio._workshop.jobs = Solver(outcome)  # type: ignore[assignment]
-    guided.begin()
+    guided.begin(course)
     guided.rests()
     guided.says(Next())
     guided.swings()
@@ -541,3 +557,168 @@ def test_every_event_can_be_said(guided: Guided) -> None:
     for event in (GoByItself(on=True), Redo(1), Repeat(), Redo(0), Next()):
         assert guided.says(event).guided is not None
     assert isinstance(guided.recorder, StillRecorder)
+
+
+# --- what comes of the other courses --------------------------------------------------------------
+
+
+def alignment(*, ok: bool = True) -> HeadingAlignment:
+    n = 20
+    reading = Reading("turn", 60.0 if ok else 10.0, 45.0, "deg")
+    return HeadingAlignment(
+        names=glove().names,
+        psi_cor=tuple(np.linspace(-0.1, 0.1, n).tolist()),
+        psi_wg=(0.0,) * n,
+        sd=(*((0.005,) * (n - 1)), float("inf")),
+        residual=(0.01,) * n,
+        together=(0.01,) * n,
+        outlying=(False,) * n,
+        turn=1.0,
+        axis_tilt=0.0,
+        verdict=Verdict("heading_rotation", (reading,)),
+    )
+
+
+@pytest.mark.parametrize("ok", [True, False])
+def test_a_quick_start_sets_the_headings_where_it_was_done_well(guided: Guided, ok: bool) -> None:
+    state = finished(guided, alignment(ok=ok), "quick_start")
+    assert guided.studio._workshop.jobs.course == "quick_start"  # type: ignore[attr-defined]
+    set_to = [o for o in guided.capture.orders if isinstance(o, SetHeading)]
+    assert set_to == ([SetHeading(alignment().psi_cor)] if ok else [])
+    sheet = view.sheet_of(state)
+    assert sheet is not None
+    assert ("Headings aligned." in sheet.content) is ok
+    assert ("disagreed by 3.5° (SD); headings are now known to 0.3°" in sheet.content) is ok
+
+
+def test_a_check_says_by_segment_whether_the_calibration_holds(guided: Guided) -> None:
+    readings = tuple(
+        Reading("against", value, 7.0, "deg", at_least=False, about=name)
+        for name, value in (("hand", 3.2), ("index_proximal", 17.0))
+    )
+    checked = Checked(calibrated().calibration, Verdict("check", readings))
+    sheet = view.sheet_of(finished(guided, checked))
+    assert sheet is not None
+    assert "does not hold any more" in sheet.content
+    assert "2026-01-01" in sheet.content
+    assert "17°" in sheet.content
+    holds = Checked(calibrated().calibration, Verdict("check", readings[:1]))
+    assert "It still holds." in answer_of(holds)
+
+
+def test_a_check_needs_a_calibration(guided: Guided) -> None:
+    state = after(guided.studio, intents.BeginCourse("check"))
+    assert state.guided is None
+    assert "no calibration" in state.messages[0].text
+
+
+def test_sensors_are_shown_before_and_after(guided: Guided) -> None:
+    one = SensorErrors("SN1", UNITY, (0.0,) * 3, UNITY, (0.0,) * 3, Residuals(0.01, 0.002), 20)
+    device = DeviceCalibration("VG-1", "2026-01-01T00:00:00Z", "1", (), (one,))
+    verdict = Verdict("tumble", (Reading("directions", 14.0, 9.0, ""),))
+    shown = SensorsFound(
+        device,
+        verdict,
+        ("SN1", "SN2"),
+        (Agreement(0.31, 1.7), Agreement(float("nan"), float("nan"))),
+        (Agreement(0.012, 0.11), Agreement(float("nan"), float("nan"))),
+    )
+    sheet = view.sheet_of(finished(guided, shown))
+    assert sheet is not None
+    assert "0.31 → 0.012 m/s²" in sheet.content
+    assert "1.70 → 0.11°" in sheet.content
+    refused = replace(shown, verdict=Verdict("tumble", (Reading("directions", 4.0, 9.0, ""),)))
+    assert "stay as they were" in answer_of(refused)
+
+
+def test_noise_is_shown_by_sensor() -> None:
+    density = Density(0.0001, 0.00009, 0.00012, True)
+    axis = AxisNoise((1.0,), (0.1,), (0.1,), (0.1,), density, Density(0.0, 0.0, 1e-6, False), 1.2)
+    three = (axis, axis, axis)
+    content = answer_of(Noise((SensorNoise("SN1", three, three),), ("SN2",), 100.0, (1200.0,)))
+    assert "20 min at 100 Hz" in content
+    assert "0.00573" in content  # 0.0001 rad in degrees
+    assert "silent or stuck" in content
+
+
+# --- the calibration in use -----------------------------------------------------------------------
+
+MADE = "2026-01-01T00:00:00+00:00"
+
+
+def kept(studio: Studio, id: str = "one", made: str = MADE, **values: Any) -> SubjectCalibration:
+    one = msgspec.structs.replace(calibrated().calibration, id=id, made_utc=made, **values)
+    save_calibration(studio.state.sessions, one)
+    return one
+
+
+def sent(guided: Guided) -> list[Any]:
+    orders = [o for o in guided.capture.orders if isinstance(o, SetSubject)]
+    return [order.calibration for order in orders]
+
+
+def test_the_calibration_of_whoever_is_chosen_is_used(guided: Guided) -> None:
+    one = kept(guided.studio)
+    after(guided.studio, intents.ChooseSubject(""))
+    state = after(guided.studio, intents.ChooseSubject("S01"))
+    assert sent(guided) == [one]
+    assert state.in_use.subject == one
+    words = " ".join(step.figure for step in calibration_view.steps_of(state))
+    assert "calibrated 2026-01-01 00:00" in words
+    assert "glove VG-7" in words
+    after(guided.studio, intents.ChooseSubject(""))
+    assert sent(guided) == [one, None]
+
+
+def test_none_can_be_used_and_the_one_before(guided: Guided) -> None:
+    first = kept(guided.studio)
+    second = kept(guided.studio, "two", "2026-01-02T00:00:00+00:00")
+    after(guided.studio, intents.ChooseSubject(""))
+    after(guided.studio, intents.ChooseSubject("S01"))
+    state = after(guided.studio, intents.UseCalibration("none"))
+    assert state.in_use.none
+    assert "as asked" in " ".join(step.figure for step in calibration_view.steps_of(state))
+    after(guided.studio, intents.UseCalibration("again"))
+    after(guided.studio, intents.UseCalibration("previous"))
+    assert sent(guided) == [second, None, second, first]
+    state = after(guided.studio, intents.UseCalibration("previous"))
+    assert "no calibration before" in state.messages[0].text
+    assert state.in_use.subject == first
+
+
+def test_a_broken_file_is_told_and_the_last_good_one_is_used(guided: Guided) -> None:
+    one = kept(guided.studio)
+    (file,) = guided.studio.state.sessions.glob("S01/calibration.right.json")
+    file.write_bytes(b"{broken")
+    after(guided.studio, intents.ChooseSubject(""))
+    state = after(guided.studio, intents.ChooseSubject("S01"))
+    assert any(message.alarm for message in state.messages)
+    assert sent(guided) == [one]
+
+
+def test_a_new_calibration_is_used_at_once(guided: Guided) -> None:
+    new = calibrated()
+    one = msgspec.structs.replace(new.calibration, made_utc=MADE)
+    guided.studio._workshop.jobs = Solver(replace(new, calibration=one))  # type: ignore[assignment]
+    guided.begin()
+    guided.rests()
+    guided.says(Next())
+    guided.swings()
+    guided.says(Next())
+    save_calibration(guided.studio.state.sessions, one)  # as the job does
+    guided.ends()
+    assert sent(guided) == [one]
+
+
+def test_the_errors_of_the_device_that_is_there_are_used(guided: Guided) -> None:
+    setup = guided.capture.newest.setup
+    assert setup is not None
+    assert setup.device is not None
+    device = DeviceCalibration(
+        setup.device.serial_number, "2026-01-01T00:00:00.000+00:00", "1", (), ()
+    )
+    save_device_calibration(guided.studio.state.sessions, device)
+    after(guided.studio, intents.ChooseSubject(""))
+    state = guided.studio.tick(TICK_S)
+    assert state.in_use.sensors == device
+    assert SetSensors(device) in guided.capture.orders
