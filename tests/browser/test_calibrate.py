@@ -119,9 +119,5 @@ def test_the_whole_course_runs_by_itself(start_studio: Start, visit: Callable[..
     assert len(set(done)) == 31  # the rest before and after the turn is called the same
     assert done.count("static") >= 28
     expect(page.get_by_text(re.compile(r"^Calibrated")).first).to_be_visible(timeout=300_000)
-    page.screenshot(path="/tmp/shots/result-1024.png")
-    page.set_viewport_size({"width": 1440, "height": 900})
-    page.wait_for_timeout(1500)
-    page.screenshot(path="/tmp/shots/result-1440.png")
     button(page, "Close").click()
     expect(button(page, "Begin: Hand")).to_be_visible()
