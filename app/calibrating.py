@@ -283,6 +283,8 @@ class Calibrator:
 
     def _finish(self, course: wizard.Course) -> None:
         self.result = Result(course, solving=course.name in SOLVED)
+        if self._courses is not None:
+            self._courses.forget(course.name)
         self._let_go()
 
     def _let_go(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,6 +86,11 @@ class Courses:
                 path=path,
                 reason=error.strerror or error,
             ) from error
+
+    def forget(self, name: str) -> None:
+        """A course is over: the next one begins at its first step."""
+        with contextlib.suppress(OSError):
+            self._path(name).unlink(missing_ok=True)
 
     def stands(self) -> tuple[Stand, ...]:
         """Where every course stands that this device has sensors for."""

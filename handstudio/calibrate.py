@@ -151,7 +151,7 @@ def _verdicts(courses: Sequence[_Course]) -> dict[str, Verdict]:
 
 def _judged(course: _Course, step: Step, label: Label) -> Verdict:
     before = course.rest_before(label) if step.kind in ("swing", "turn") else None
-    rest = None if before is None else course.part(_settled(before, 0.0))
+    rest = None if before is None else course.part(_settled(before, step.rest_s))
     done = _settled(label, step.least_s) if step.kind in ("rest", "pose") else label
     return _storable(observe(step, rest, course.part(done), course.setup.layout))
 

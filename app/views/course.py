@@ -53,6 +53,9 @@ IMPLAUSIBLE_SD = 3.0
 """A length this many standard deviations from the mean of people is one in four hundred."""
 
 
+_NAMED = 4  # steps that are worth repeating; more are counted
+
+
 @dataclass(frozen=True, slots=True)
 class Sheet:
     """What is read from two metres away, and what can be said to it.
@@ -352,7 +355,9 @@ def _calibrated(result: Result) -> str:
     names = {step.name: title_of(step) for step in result.course.steps}
     told = ""
     if repeat:
-        steps = ", ".join(names.get(name, name) for name in repeat)
+        steps = ", ".join(names.get(name, name) for name in repeat[:_NAMED])
+        if len(repeat) > _NAMED:
+            steps += ", " + _("and {count} more").format(count=len(repeat) - _NAMED)
         told += line(_("Worth repeating: {steps}.").format(steps=steps))
     if odd:
         who = ", ".join(joint_name(segment.name) for segment in odd)
