@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from handstudio.arrays import Array
+from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
 from handstudio.calibration.chain_tree import USUAL, Priors
 from handstudio.calibration.device import DeviceCalibration, corrected
 from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
@@ -102,7 +103,8 @@ def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Trut
         heading=np.array(alignment.psi_wg),
         alive=range(len(names)),
     )
-    hand = found(swings, someone.side, someone.hand_length_m, asked.priors)
+    priors = ROUGH if known is None else asked.priors
+    hand = found(swings, someone.side, someone.hand_length_m, priors)
     return hand, known, truth, labels
 
 

@@ -11,6 +11,8 @@ import msgspec
 import numpy as np
 
 from handstudio import __version__
+from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
+from handstudio.calibration.chain_tree import USUAL
 from handstudio.calibration.course import FLAT, HAND, REST, SWINGS, TURN, Step
 from handstudio.calibration.device import corrected
 from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
@@ -69,7 +71,8 @@ def calibrate(takes: Sequence[Take], progress: Progress = lambda _: None) -> Cal
     _refuse_too_little(swings)
     progress(0.6)
     side: HandSide = "left" if setup.layout.side == "left" else "right"
-    hand = found(swings, side, setup.hand.hand_length_m)
+    known = all(take.header.setup.sensors is not None for take in takes)
+    hand = found(swings, side, setup.hand.hand_length_m, USUAL if known else ROUGH)
     progress(0.95)
     now = datetime.now(UTC)
     calibration = SubjectCalibration(

@@ -64,6 +64,10 @@ class Priors:
 
 
 USUAL = Priors()
+"""Where the sensors' own errors were taken off."""
+
+UNCALIBRATED = Priors(acc_bias=0.1, tilt_rad=float(np.deg2rad(0.7)), model_m=0.002)
+"""Where they were not: 10 mg of bias, and half a degree for a scale that is 1 % off."""
 
 
 _OFF_PLANE_M = 1e-5
