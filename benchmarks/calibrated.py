@@ -12,12 +12,11 @@ import numpy as np
 from handstudio.arrays import Array
 from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
 from handstudio.calibration.chain_tree import USUAL, Priors
-from handstudio.calibration.device import DeviceCalibration, corrected
-from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
-from handstudio.calibration.quick_start import quick_start
+from handstudio.calibration.device import DeviceCalibration
+from handstudio.calibration.opening import opened
+from handstudio.calibration.recorded import even
 from handstudio.calibration.sensors import calibrate_sensors
 from handstudio.calibration.solve import Found, found
-from handstudio.calibration.swings import prepared
 from handstudio.hand.skeleton import JOINTS, PARENTS
 from handstudio.layout import glove
 from handstudio.maths import so3
@@ -82,27 +81,9 @@ def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Trut
     known = _sensors(someone, asked) if asked.sensors_first else None
     trajectory = perform(COURSE, Actor(someone, asked.seed, material()))
     samples, truth = _sensed(someone, asked, trajectory, occasion=0)
-    names = glove().names
-    if known is not None:
-        samples = corrected(samples, known, names)
-    labels = [(span.start_s, span.end_s, span.name) for span in trajectory.spans]
-    labels.sort()
-    alignment, _ = quick_start(
-        samples,
-        names,
-        labels=labels,
-        compass=False,
-        tolerances=UNCALIBRATED if known is None else CALIBRATED,
-    )
-    swings = prepared(
-        glove(),
-        float(RATE_HZ),
-        samples.gyr,
-        samples.acc,
-        labels=labels,
-        heading=np.array(alignment.psi_wg),
-        alive=range(len(names)),
-    )
+    labels = sorted((span.start_s, span.end_s, span.name) for span in trajectory.spans)
+    recorded = even([samples], RATE_HZ, known, glove().names)
+    swings = opened(glove(), float(RATE_HZ), recorded, labels, calibrated=known is not None)
     priors = ROUGH if known is None else asked.priors
     hand = found(swings, someone.side, someone.hand_length_m, priors)
     return hand, known, truth, labels

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
-from handstudio.calibration.device import corrected
-from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED, HeadingAlignment
+from handstudio.calibration.heading import HeadingAlignment, tolerances_of
 from handstudio.calibration.quick_start import Labelled, quick_start
 from handstudio.calibration.recorded import even
 from handstudio.errors import CalibrationError
@@ -36,15 +35,13 @@ def aligned(
     Raises:
         CalibrationError: there is no quick start in it, or none that can be used.
     """
-    samples = even(runs, setup.rate_hz).samples
-    if setup.sensors is not None:
-        samples = corrected(samples, setup.sensors, setup.layout.names)
+    names = setup.layout.names
     found, _ = quick_start(
-        samples,
-        setup.layout.names,
+        even(runs, setup.rate_hz, setup.sensors, names).samples,
+        names,
         labels=labels,
         compass=True,
-        tolerances=UNCALIBRATED if setup.sensors is None else CALIBRATED,
+        tolerances=tolerances_of(setup.sensors is not None),
     )
     return msgspec.structs.replace(setup, heading_rad=found.psi_cor), found
 

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypeAlias
 
-import msgspec
 import numpy as np
 
 from handstudio import __version__
 from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
 from handstudio.calibration.chain_tree import USUAL
-from handstudio.calibration.course import FLAT, HAND, REST, SWINGS, TURN, Step
-from handstudio.calibration.device import corrected
-from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
-from handstudio.calibration.quick_start import quick_start
+from handstudio.calibration.course import FLAT, HAND, REST, SWINGS, TURN
+from handstudio.calibration.opening import opened
+from handstudio.calibration.quick_start import Labelled
 from handstudio.calibration.recorded import Recorded, even
 from handstudio.calibration.solve import found
 from handstudio.calibration.subject import SubjectCalibration
-from handstudio.calibration.swings import Swings, joined, prepared
+from handstudio.calibration.swings import Swings, joined
 from handstudio.calibration.verdict import Reading, Verdict
 from handstudio.calibration.watching import observe
 from handstudio.errors import CalibrationError
 from handstudio.hand.skeleton import HandSide
 from handstudio.recording.calibrations import new_id
-from handstudio.recording.notes import Label, load_notes
+from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
 from handstudio.samples import ImuSamples
 from handstudio.setup import Setup
@@ -102,67 +100,64 @@ _STEPS = {step.name: step for step in HAND}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Course:
-    """One take of it, freed of the sensors' errors."""
+    """One take of it, freed of the sensors' errors; and what each labelled step was seen to be."""
 
-    take: Take
+    setup: Setup
     recorded: Recorded
-    labels: tuple[Label, ...]
-
-    @property
-    def setup(self) -> Setup:
-        return self.take.header.setup
-
-    def part(self, label: Label) -> ImuSamples:
-        return self.recorded.part(label.start_s, label.end_s, self.setup.rate_hz)
-
-    def rest_before(self, label: Label) -> Label | None:
-        rests = [x for x in self.labels if x.label == REST.name and x.end_s <= label.start_s + 0.5]
-        return max(rests, key=lambda x: x.end_s, default=None)
+    labels: list[Labelled]
+    verdicts: dict[Labelled, Verdict]
 
 
 def _course(take: Take) -> _Course:
-    setup = take.header.setup
-    labels = tuple(sorted(load_notes(take.path).labels, key=lambda x: (x.start_s, x.end_s)))
-    if not any(label.label in _STEPS for label in labels):
+    setup, labels = take.header.setup, stretches(take.path)
+    if not any(name in _STEPS for _, _, name in labels):
         raise CalibrationError(
             "{take}: no part of it is labelled as a step of a calibration.",
             "Record one with the course under Calibrate, or label its parts (static, "
             "heading_rotation, index_mcp:flexion ...).",
             take=take.path.name,
         )
-    runs = [event for events in take.events() for event in events if isinstance(event, ImuSamples)]
-    recorded = even(runs, setup.rate_hz)
-    if setup.sensors is not None:
-        free = corrected(recorded.samples, setup.sensors, setup.layout.names)
-        recorded = replace(recorded, samples=free)
-    return _Course(take, recorded, labels)
+    recorded = even(take.runs(), setup.rate_hz, setup.sensors, setup.layout.names)
+    verdicts = {
+        label: _judged(setup, recorded, labels, label) for label in labels if label[2] in _STEPS
+    }
+    return _Course(setup, recorded, labels, verdicts)
 
 
 def _verdicts(courses: Sequence[_Course]) -> dict[str, Verdict]:
     """Of every step: that of the last time it was done well, else of the last time."""
     out: dict[str, Verdict] = {}
     for course in courses:
-        for label in course.labels:
-            if label.label not in _STEPS:
-                continue
-            step = _STEPS[label.label]
-            verdict = _judged(course, step, label)
-            if verdict.ok or step.name not in out or not out[step.name].ok:
-                out[step.name] = verdict
+        for (_, _, name), verdict in course.verdicts.items():
+            if verdict.ok or name not in out or not out[name].ok:
+                out[name] = verdict
     return out
 
 
-def _judged(course: _Course, step: Step, label: Label) -> Verdict:
-    before = course.rest_before(label) if step.kind in ("swing", "turn") else None
-    rest = None if before is None else course.part(_settled(before, step.rest_s))
+def _judged(
+    setup: Setup, recorded: Recorded, labels: Sequence[Labelled], label: Labelled
+) -> Verdict:
+    step = _STEPS[label[2]]
+    before = _rest_before(labels, label) if step.kind in ("swing", "turn") else None
+    rest = None if before is None else _part(setup, recorded, _settled(before, step.rest_s))
     done = _settled(label, step.least_s) if step.kind in ("rest", "pose") else label
-    return _storable(observe(step, rest, course.part(done), course.setup.layout))
+    return _storable(observe(step, rest, _part(setup, recorded, done), setup.layout))
 
 
-def _settled(label: Label, least_s: float) -> Label:
+def _rest_before(labels: Sequence[Labelled], label: Labelled) -> Labelled | None:
+    rests = [x for x in labels if x[2] == REST.name and x[1] <= label[0] + 0.5]
+    return max(rests, key=lambda x: x[1], default=None)
+
+
+def _part(setup: Setup, recorded: Recorded, label: Labelled) -> ImuSamples:
+    return recorded.part(label[0], label[1], setup.rate_hz)
+
+
+def _settled(label: Labelled, least_s: float) -> Labelled:
     """A rest less its beginning, in which boards still swing from the movement before."""
-    latest = max(label.start_s, label.end_s - max(least_s, 1.0))
-    return msgspec.structs.replace(label, start_s=min(label.start_s + _SETTLING_S, latest))
+    start, end, name = label
+    latest = max(start, end - max(least_s, 1.0))
+    return min(start + _SETTLING_S, latest), end, name
 
 
 def _storable(verdict: Verdict) -> Verdict:
@@ -175,32 +170,23 @@ def _storable(verdict: Verdict) -> Verdict:
 
 def _prepared(course: _Course, verdicts: dict[str, Verdict]) -> Swings:
     """A take's swings; those done badly only where nothing better is there."""
-    setup, samples = course.setup, course.recorded.samples
-    kept = []
-    for label in course.labels:
-        step = _STEPS.get(label.label)
-        bad = step is not None and step.kind == "swing" and not _judged(course, step, label).ok
-        if not (bad and verdicts[label.label].ok):
-            kept.append((label.start_s, label.end_s, label.label))
-    alignment, _ = quick_start(
-        samples,
-        setup.layout.names,
-        labels=kept,
-        compass=False,
-        tolerances=UNCALIBRATED if setup.sensors is None else CALIBRATED,
-    )
-    return prepared(
-        setup.layout,
-        setup.rate_hz,
-        samples.gyr,
-        samples.acc,
-        labels=_last_of_each(kept),
-        heading=np.array(alignment.psi_wg),
-        alive=course.recorded.alive,
+    kept = [label for label in course.labels if not _outdone(course, verdicts, label)]
+    return opened(
+        course.setup.layout,
+        course.setup.rate_hz,
+        course.recorded,
+        _last_of_each(kept),
+        calibrated=course.setup.sensors is not None,
     )
 
 
-def _last_of_each(labels: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+def _outdone(course: _Course, verdicts: dict[str, Verdict], label: Labelled) -> bool:
+    """Whether a swing was done badly here and well another time."""
+    verdict = course.verdicts.get(label) if ":" in label[2] else None
+    return verdict is not None and not verdict.ok and verdicts[label[2]].ok
+
+
+def _last_of_each(labels: Sequence[Labelled]) -> list[Labelled]:
     """Of a swing done twice the last one; rests all stay."""
     last = {name: start for start, _, name in labels if ":" in name}
     return [x for x in labels if ":" not in x[2] or last[x[2]] == x[0]]

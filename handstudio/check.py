@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
-
-import numpy as np
 
 from handstudio.calibration.checking import LIMIT_DEG, LIMIT_UNCALIBRATED_DEG
 from handstudio.calibration.checking import check as held_against
 from handstudio.calibration.course import FLAT, GRASP
-from handstudio.calibration.device import corrected
-from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED
-from handstudio.calibration.quick_start import quick_start
+from handstudio.calibration.opening import opened
 from handstudio.calibration.recorded import even
 from handstudio.calibration.subject import SubjectCalibration
-from handstudio.calibration.swings import Swings, prepared
+from handstudio.calibration.swings import Swings
 from handstudio.calibration.verdict import Verdict
 from handstudio.errors import CalibrationError
-from handstudio.recording.notes import load_notes
+from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
-from handstudio.samples import ImuSamples
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,31 +80,17 @@ def _last_with(takes: Sequence[Take], label: str) -> Take:
     )
 
 
-def _labels(take: Take, only: str = "") -> list[tuple[float, float, str]]:
-    labels = sorted((x.start_s, x.end_s, x.label) for x in load_notes(take.path).labels)
-    return [label for label in labels if only in ("", label[2])]
+def _labels(take: Take, only: str) -> list[tuple[float, float, str]]:
+    return [stretch for stretch in stretches(take.path) if stretch[2] == only]
 
 
 def _prepared(take: Take) -> Swings:
-    setup, labels = take.header.setup, _labels(take)
-    runs = [one for one in chain.from_iterable(take.events()) if isinstance(one, ImuSamples)]
-    recorded = even(runs, setup.rate_hz)
-    samples, free = recorded.samples, setup.sensors is not None
-    if setup.sensors is not None:
-        samples = corrected(samples, setup.sensors, setup.layout.names)
-    alignment, _ = quick_start(
-        samples,
-        setup.layout.names,
-        labels=labels,
-        compass=False,
-        tolerances=CALIBRATED if free else UNCALIBRATED,
-    )
-    return prepared(
+    setup = take.header.setup
+    recorded = even(take.runs(), setup.rate_hz, setup.sensors, setup.layout.names)
+    return opened(
         setup.layout,
         setup.rate_hz,
-        samples.gyr,
-        samples.acc,
-        labels=labels,
-        heading=np.array(alignment.psi_wg),
-        alive=recorded.alive,
+        recorded,
+        stretches(take.path),
+        calibrated=setup.sensors is not None,
     )

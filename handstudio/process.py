@@ -24,7 +24,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.heading import HeadingAlignment
 from handstudio.errors import SetupError, TakeError
 from handstudio.pipeline import Motion
-from handstudio.recording.notes import load_notes
+from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
 from handstudio.samples import Event, ImuSamples
 from handstudio.setup import Setup
@@ -95,9 +95,7 @@ def aligned_setup(take: Take, setup: Setup | None = None) -> tuple[Setup, Headin
         CalibrationError: there is no quick start in it, or none that can be used.
         TakeError: the take or its notes cannot be read.
     """
-    labels = [(each.start_s, each.end_s, each.label) for each in load_notes(take.path).labels]
-    runs = [one for one in chain.from_iterable(take.events()) if isinstance(one, ImuSamples)]
-    return aligned(setup or take.header.setup, runs, labels)
+    return aligned(setup or take.header.setup, take.runs(), stretches(take.path))
 
 
 def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:

@@ -21,7 +21,8 @@ from handstudio.maths import so3
 
 LIMIT_DEG = 7.0
 """How far a segment may have moved. The same glove, left on, seems to move by five degrees at
-most (three virtual people of development); put on again, some segment of it by twenty."""
+most (virtual people 101 to 103, who are not apart from those reported on); put on again, some
+segment of it by twenty."""
 
 LIMIT_UNCALIBRATED_DEG = 11.0
 """The same of sensors whose own errors are not known: there it seems to move by nine."""

@@ -19,7 +19,14 @@ from handstudio.arrays import Array
 from handstudio.calibration.attitude import attitude
 from handstudio.calibration.averages import blocks_of, valid_mean
 from handstudio.calibration.course import TURN
-from handstudio.calibration.heading_fit import CALIBRATED, UNCALIBRATED, Found, Tolerances, solved
+from handstudio.calibration.heading_fit import (
+    CALIBRATED,
+    UNCALIBRATED,
+    Found,
+    Tolerances,
+    solved,
+    tolerances_of,
+)
 from handstudio.calibration.level_headings import compass_headings, robust_mean, wg_heading, wrapped
 from handstudio.calibration.rig_turn import LEAST_TURN, signals_of
 from handstudio.calibration.verdict import Reading, Unit, Verdict, What
@@ -35,6 +42,7 @@ __all__ = [
     "Tolerances",
     "align",
     "at_peak",
+    "tolerances_of",
 ]
 
 FOREARM = ("SN1", "SN2", "SN3")

@@ -76,6 +76,11 @@ CALIBRATED = Tolerances(gyr_scale=0.002, acc_scale=0.002, gyr_cross=0.002, acc_c
 """Sensors whose scales and axes were calibrated."""
 
 
+def tolerances_of(calibrated: bool) -> Tolerances:
+    """What sensors are off by, whose own errors are known or not."""
+    return CALIBRATED if calibrated else UNCALIBRATED
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """What a round found; misfit and strain: RMS of what is left, and of the unknowns, in SDs."""

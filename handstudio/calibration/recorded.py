@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from handstudio.arrays import Array
+from handstudio.calibration.device import DeviceCalibration, corrected
 from handstudio.errors import CalibrationError
 from handstudio.samples import ImuSamples
 
@@ -35,8 +36,19 @@ class Recorded:
         return self.samples[max(0, round(start_s * rate_hz)) : max(0, round(end_s * rate_hz))]
 
 
-def even(runs: Sequence[ImuSamples], rate_hz: float) -> Recorded:
-    """Lay runs of samples onto an even raster.
+def even(
+    runs: Sequence[ImuSamples],
+    rate_hz: float,
+    errors: DeviceCalibration | None = None,
+    names: Sequence[str] = (),
+) -> Recorded:
+    """Lay runs of samples onto an even raster, freed of the sensors' errors where they are known.
+
+    Args:
+        runs: As they were read.
+        rate_hz: Of the raster.
+        errors: Of the sensors; None: not known.
+        names: Of the sensors, in order; needed for their errors only.
 
     Raises:
         CalibrationError: there are none.
@@ -64,6 +76,8 @@ def even(runs: Sequence[ImuSamples], rate_hz: float) -> Recorded:
         valid=whole.valid[nearest],
         saturated=whole.saturated[nearest],
     )
+    if errors is not None:
+        samples = corrected(samples, errors, names)
     return Recorded(samples, hole, tuple(int(i) for i in np.flatnonzero(answered >= _ANSWERED)))
 
 

@@ -42,6 +42,15 @@ class Notes(msgspec.Struct, frozen=True):
     marks: tuple[Mark, ...] = ()
 
 
+def stretches(take: Path) -> list[tuple[float, float, str]]:
+    """The labels of a take as begin and end [s] and name, in order of time.
+
+    Raises:
+        TakeError: its notes cannot be read.
+    """
+    return sorted((each.start_s, each.end_s, each.label) for each in load_notes(take).labels)
+
+
 def with_text(notes: Notes, text: str) -> Notes:
     """Notes with other words."""
     return msgspec.structs.replace(notes, text=text)

@@ -32,7 +32,7 @@ from handstudio.recording.header import (
 )
 from handstudio.recording.naming import UNFINISHED
 from handstudio.recording.samples_message import decode_samples
-from handstudio.samples import Event
+from handstudio.samples import Event, ImuSamples
 from handstudio.stream import EventStream
 
 RECORD_LIMIT = 1 << 28
@@ -99,6 +99,10 @@ class Take:
         stream = self._stream(from_start)
         for arrival_ns, chunk in self.chunks():
             yield stream.feed(chunk, arrival_ns)[1]
+
+    def runs(self) -> list[ImuSamples]:
+        """All its samples, run by run, gaps between them."""
+        return [run for events in self.events() for run in events if isinstance(run, ImuSamples)]
 
     def decoded(self) -> Iterator[tuple[int | None, list[Packet], list[Event]]]:
         """Arrival [ns UTC], packets and events of every chunk; an import has events alone."""
