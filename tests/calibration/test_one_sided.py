@@ -18,32 +18,10 @@ from handstudio.calibration.robust_fit import UNSEEN_SD_M
 from handstudio.errors import CalibrationError
 from handstudio.maths import so3
 
+from .rotations import RATE_HZ, Y, Z, swing, turning
+
 P = np.array([0.041, -0.008, 0.013])
 HINGE = np.array([0.6, 0.0, 0.8])
-
-RATE_HZ = 100.0
-X, Y, Z = np.eye(3)
-
-
-def turning(*joints: tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]):
-    """Orientation, rate and its derivative in the last frame of turns one after the other."""
-    q, gyr, domega = so3.IDENTITY, np.zeros(3), np.zeros(3)
-    for axis, (angle, rate, slope) in joints:
-        own = rate[:, None] * axis
-        turn = so3.from_axis_angle(axis, angle)
-        back = so3.conjugate(turn)
-        carried = so3.rotate(back, gyr)
-        domega = so3.rotate(back, domega) - np.cross(own, carried) + slope[:, None] * axis
-        q, gyr = so3.multiply(q, turn), carried + own
-    return q, gyr, domega
-
-
-def swing(seconds: float, hz: float, degrees: float, phase: float = 0.0):
-    """Angle, rate and its derivative of a swing to and fro."""
-    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
-    w, size = 2.0 * np.pi * hz, np.deg2rad(degrees)
-    wt = w * t + phase
-    return size * np.sin(wt), size * w * np.cos(wt), -size * w**2 * np.sin(wt)
 
 
 def two_axes(seconds: float = 20.0):
