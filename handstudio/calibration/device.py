@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import msgspec
@@ -137,23 +138,21 @@ def corrected(
         names: Of the sensors of the samples, in order. Those without an entry stay as they are,
             and so do magnetometers that have none.
     """
-    known = [(i, calibration.by_name[n]) for i, n in enumerate(names) if n in calibration.by_name]
-    if not known:
+    errors = _stacked(calibration, tuple(names))
+    if not errors.at:
         return samples
-    at, entries = [i for i, _ in known], [entry for _, entry in known]
-    acc = _free(samples.acc[:, at], [e.acc_matrix for e in entries], [e.acc_bias for e in entries])
-    gyr = _free(
-        samples.gyr[:, at] - _times(np.array([e.gyr_per_acc for e in entries]), acc),
-        [e.gyr_matrix for e in entries],
-        [e.gyr_bias for e in entries],
+    acc = _times(errors.acc[0], samples.acc[:, errors.at] - errors.acc[1])
+    felt = samples.gyr[:, errors.at] - _times(errors.gyr_per_acc, acc)
+    gyr = _times(errors.gyr[0], felt - errors.gyr[1])
+    result = replace(
+        samples,
+        acc=_put(samples.acc, errors.at, acc),
+        gyr=_put(samples.gyr, errors.at, gyr),
     )
-    result = replace(samples, acc=_put(samples.acc, at, acc), gyr=_put(samples.gyr, at, gyr))
-    magnetic = [(i, e.mag_matrix, e.mag_bias) for i, e in known if e.mag_matrix and e.mag_bias]
-    if not magnetic:
+    if not errors.mag_at:
         return result
-    at = [i for i, _, _ in magnetic]
-    mag = _free(samples.mag[:, at], [m for _, m, _ in magnetic], [b for _, _, b in magnetic])
-    return replace(result, mag=_put(samples.mag, at, mag))
+    mag = _times(errors.mag[0], samples.mag[:, errors.mag_at] - errors.mag[1])
+    return replace(result, mag=_put(samples.mag, errors.mag_at, mag))
 
 
 def encode(calibration: DeviceCalibration) -> str:
@@ -208,8 +207,32 @@ class _Version(msgspec.Struct):
     format: int
 
 
-def _free(reading: Array, matrices: Sequence[Matrix], biases: Sequence[Vector]) -> Array:
-    return _times(np.array(matrices), reading - np.array(biases))
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stacked:
+    """Matrices and biases of the sensors that are known, and which those are."""
+
+    at: list[int]
+    acc: tuple[Array, Array]
+    gyr: tuple[Array, Array]
+    gyr_per_acc: Array
+    mag_at: list[int]
+    mag: tuple[Array, Array]
+
+
+@lru_cache(maxsize=4)  # asked for with every chunk of a stream
+def _stacked(calibration: DeviceCalibration, names: tuple[str, ...]) -> _Stacked:
+    by_name = calibration.by_name
+    known = [(i, by_name[name]) for i, name in enumerate(names) if name in by_name]
+    entries = [entry for _, entry in known]
+    magnetic = [(i, e.mag_matrix, e.mag_bias) for i, e in known if e.mag_matrix and e.mag_bias]
+    return _Stacked(
+        at=[i for i, _ in known],
+        acc=(np.array([e.acc_matrix for e in entries]), np.array([e.acc_bias for e in entries])),
+        gyr=(np.array([e.gyr_matrix for e in entries]), np.array([e.gyr_bias for e in entries])),
+        gyr_per_acc=np.array([e.gyr_per_acc for e in entries]),
+        mag_at=[i for i, _, _ in magnetic],
+        mag=(np.array([m for _, m, _ in magnetic]), np.array([b for _, _, b in magnetic])),
+    )
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
