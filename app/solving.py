@@ -3,50 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeAlias
 
-from handstudio import __version__
 from handstudio.calibrate import Calibrated, calibrate
-from handstudio.calibration.agreement import Agreement, agreement_of
-from handstudio.calibration.device import DeviceCalibration, Source, corrected
+from handstudio.calibrate_sensors import SensorsFound, calibrate_sensors
 from handstudio.calibration.heading import HeadingAlignment
 from handstudio.calibration.noise import Noise, noise_of
-from handstudio.calibration.sensors import calibrate_sensors
-from handstudio.calibration.verdict import Verdict
 from handstudio.check import Checked, check
 from handstudio.errors import CalibrationError
 from handstudio.process import aligned_setup
 from handstudio.recording.at_rest import static_recordings
 from handstudio.recording.calibrations import save_calibration
-from handstudio.recording.device_calibrations import device_of, save_device_calibration, tumbled
+from handstudio.recording.device_calibrations import save_device_calibration
 from handstudio.recording.take import Take
 
 SOLVED = ("hand", "check", "quick_start", "sensors", "noise")
 """Courses of which something is computed."""
 
 Tell: TypeAlias = Callable[[float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class SensorsFound:
-    """Errors of a device's sensors; kept where the verdict is good.
-
-    Attributes:
-        calibration: What was found.
-        verdict: Whether it was done well.
-        names: Of the sensors.
-        before: What did not agree with gravity as they were shipped.
-        after: And with their errors taken off.
-    """
-
-    calibration: DeviceCalibration
-    verdict: Verdict
-    names: tuple[str, ...]
-    before: tuple[Agreement, ...]
-    after: tuple[Agreement, ...]
 
 
 Answer: TypeAlias = Calibrated | Checked | HeadingAlignment | SensorsFound | Noise
@@ -77,22 +52,10 @@ def solve(name: str, takes: Sequence[Take], sessions: Path, tell: Tell) -> Answe
 
 
 def _sensors(takes: Sequence[Take], sessions: Path, tell: Tell) -> SensorsFound:
-    serial, names = device_of(takes)
-    samples = tumbled(takes, lambda share: tell(0.3 * share))
-    found, verdict = calibrate_sensors(
-        samples,
-        names,
-        device=serial,
-        made_utc=datetime.now(UTC).isoformat(timespec="milliseconds"),
-        software=f"handstudio {__version__}",
-        source=[Source(take.header.name, take.sha256()) for take in takes],
-    )
-    tell(0.8)
-    before, after = (agreement_of(each) for each in (samples, corrected(samples, found, names)))
-    if verdict.ok:
-        save_device_calibration(sessions, found)
-    tell(1.0)
-    return SensorsFound(found, verdict, tuple(names), tuple(before), tuple(after))
+    found = calibrate_sensors(takes, progress=tell)
+    if found.verdict.ok:
+        save_device_calibration(sessions, found.calibration)
+    return found
 
 
 def _noise(takes: Sequence[Take], tell: Tell) -> Noise:

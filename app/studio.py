@@ -23,13 +23,14 @@ from app.keeping import Keeper
 from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
 from app.review import Review
-from app.solving import Answer, SensorsFound
+from app.solving import Answer
 from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
 from app.workshop import Computed, Exported, Gathered, Solved, Workshop
 from handstudio.calibrate import Calibrated
+from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
 from handstudio.device.capture import Capture
 from handstudio.device.orders import (

@@ -11,13 +11,12 @@ from typing import Annotated
 import msgspec
 import tyro
 
-from handstudio import __version__
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate import calibrate as calibrate_takes
-from handstudio.calibration.agreement import Agreement, agreement_of
-from handstudio.calibration.device import DeviceCalibration, Source, corrected
+from handstudio.calibrate_sensors import calibrate_sensors as sensors_of
+from handstudio.calibration.agreement import Agreement
+from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.mirrored import mirrored
-from handstudio.calibration.sensors import calibrate_sensors as sensors_of
 from handstudio.calibration.subject import SubjectCalibration, decode
 from handstudio.commands.arguments import Json, Sessions
 from handstudio.commands.readings import show_verdicts, told
@@ -34,12 +33,10 @@ from handstudio.recording.calibrations import (
 from handstudio.recording.device_calibrations import (
     DeviceVersion,
     device_history,
-    device_of,
     load_device_calibration,
     named,
     restore_device_calibration,
     save_device_calibration,
-    tumbled,
 )
 from handstudio.recording.library import sessions_folder
 from handstudio.recording.subjects import existing
@@ -123,28 +120,19 @@ def calibrate_sensors(
         json: Print JSON for a program instead of words.
     """
     opened = _opened(takes, "calibrate-sensors")
-    serial, names = device_of(opened, device)
-    with progress("reading the takes", quiet=json) as share:
-        samples = tumbled(opened, share)
-    found, verdict = sensors_of(
-        samples,
-        names,
-        device=serial,
-        made_utc=datetime.now(UTC).isoformat(timespec="milliseconds"),
-        software=f"handstudio {__version__}",
-        source=[Source(take.header.name, take.sha256()) for take in opened],
-    )
-    before, after = (agreement_of(each) for each in (samples, corrected(samples, found, names)))
+    with progress("calibrating the sensors", quiet=json) as share:
+        found = sensors_of(opened, device, share)
+    names, verdict, before, after = found.names, found.verdict, found.before, found.after
     if not json:
         show_verdicts([verdict])
-        _show_sensors(found, names, before, after)
+        _show_sensors(found.calibration, names, before, after)
     kept = None
     if not dry_run and (anyway or verdict.ok):
-        kept = save_device_calibration(sessions_folder(sessions), found)
+        kept = save_device_calibration(sessions_folder(sessions), found.calibration)
     if json:
         print_json(
             {
-                "calibration": found,
+                "calibration": found.calibration,
                 "verdicts": told([verdict]),
                 "before": dict(zip(names, before, strict=True)),
                 "after": dict(zip(names, after, strict=True)),
@@ -398,7 +386,10 @@ def _say_kept(kept: Path | None, dry_run: bool) -> None:
 
 
 def _show_sensors(
-    found: DeviceCalibration, names: Sequence[str], before: list[Agreement], after: list[Agreement]
+    found: DeviceCalibration,
+    names: Sequence[str],
+    before: Sequence[Agreement],
+    after: Sequence[Agreement],
 ) -> None:
     known = found.by_name
     rows = []

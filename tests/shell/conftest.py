@@ -14,7 +14,10 @@ from typing import Any
 import msgspec
 import pytest
 
+from handstudio import shell
 from handstudio.cli import main
+
+WIDE = 400  # columns
 
 _ALL_HELP = """
 import contextlib, io, json
@@ -90,9 +93,15 @@ def help_of() -> dict[str, str]:
 
 
 @pytest.fixture
-def here(capsys, monkeypatch) -> Callable[..., Said]:
+def wide(monkeypatch) -> None:
+    """A terminal in this process that folds no line, be the consoles made already or not."""
+    for console in (shell.out, shell.err):
+        monkeypatch.setattr(console, "width", WIDE)
+
+
+@pytest.fixture
+def here(capsys, wide) -> Callable[..., Said]:
     """The same within this process, which is there sooner: for what says little."""
-    monkeypatch.setenv("COLUMNS", "200")
 
     def run(*arguments: object) -> Said:
         capsys.readouterr()

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from handstudio.calibrate import Calibrated
+from handstudio.calibrate_sensors import SensorsFound
+from handstudio.calibration.agreement import agreement_of
 from handstudio.calibration.device import decode as decode_device
 from handstudio.calibration.device import encode as encode_device
 from handstudio.calibration.mirrored import mirrored
@@ -332,7 +334,10 @@ def test_sensors_are_told_and_refused_where_the_verdict_is_bad(
     found = decode_device(Path(calibrated[1]["kept"]).read_bytes())
     found = msgspec.structs.replace(found, sensors=found.sensors[1:])
     few = Verdict("tumble", (Reading("answering", 19.0, 20.0, ""),))
-    monkeypatch.setattr(commands, "sensors_of", lambda *_, **__: (found, few))
+    names = open_take(take).header.setup.layout.names
+    felt = tuple(agreement_of(tumbled([open_take(take)])))
+    bad = SensorsFound(found, few, names, felt, felt)
+    monkeypatch.setattr(commands, "sensors_of", lambda *_, **__: bad)
     said = here("calibrate-sensors", take, "--sessions", sessions)
     assert said.code == 1
     assert "sensors with a result: 19, at least 20 wanted: check its plug" in said.out

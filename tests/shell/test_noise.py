@@ -55,9 +55,8 @@ def take(tmp_path) -> Path:
 
 
 @pytest.fixture
-def said(capsys, monkeypatch):
+def said(capsys, wide):
     """``said(take)``: what the command prints."""
-    monkeypatch.setenv("COLUMNS", "200")
 
     def run(*takes: Path, **more) -> str:
         assert noise(takes, **more) == 0

@@ -15,7 +15,6 @@ import pytest
 
 from app import courses, intents
 from app.calibrating import manner_of, performs
-from app.solving import SensorsFound
 from app.sounds import Sound
 from app.state import State
 from app.studio import Studio
@@ -25,6 +24,7 @@ from app.views import recording as recording_view
 from app.views.answers import answer_of
 from app.views.steps import failing_of, sentence_of, title_of
 from handstudio.calibrate import Calibrated
+from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.agreement import Agreement
 from handstudio.calibration.allan import AxisNoise, Density
 from handstudio.calibration.course import COURSES, SWINGS, Step
