@@ -27,7 +27,7 @@ from handstudio.wizards.course import Cue, Event, Labelled, Leave, Lost, Perform
 _OF_HANDS = ("hand", "check")
 
 _TAKE_NAMES = {"hand": "calibration"}
-_PATIENCE_S = 5.0  # until a take that was asked for is on
+_PATIENCE_S = 15.0  # until a take that was asked for is on
 _SOUNDS = {
     Cue.TICK: Sound.TICK,
     Cue.START: Sound.START,

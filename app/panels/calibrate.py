@@ -31,7 +31,7 @@ class CalibratePanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._list = gui.add_html("", visible=False)
         self._steps: dict[str, int] = {}
-        self._index = -1
+        self._picked: int | None = None  # by a person, until it is done again
         self._step = gui.add_dropdown(_("Step"), ("",), visible=False)
         self._redo = gui.add_button(
             _("Do this step again"), icon=viser.Icon.REPEAT, color=QUIET, visible=False
@@ -59,9 +59,8 @@ class CalibratePanel:
                 color=QUIET,
                 hint=_("As the hand lies now, forearm ahead; key: H, all sensors"),
             )
-        self._redo.on_click(
-            lambda _event: send(intents.RedoStep(self._steps.get(self._step.value, -1)))
-        )
+        self._step.on_update(typed(self._pick))
+        self._redo.on_click(lambda _event: self._say_redo(send))
         self._by_itself.on_update(typed(lambda on: send(intents.Guide(GoByItself(on)))))
         self._reset.on_click(lambda _event: send(intents.ResetHeading(self._sensor())))
 
@@ -73,6 +72,7 @@ class CalibratePanel:
             put(handle, visible=on)
         put(self._sheet, visible=not on)
         if guided is None:
+            self._picked = None
             steps = calibration_view.steps_of(state)
             put(self._sheet, content=calibration_view.as_html(steps))
         else:
@@ -92,13 +92,18 @@ class CalibratePanel:
         put(self._reset, disabled=state.newest.phase is not Phase.STREAMING)
 
     def _render_steps(self, choices: dict[str, int], index: int) -> None:
-        if choices == self._steps:
-            return
-        chosen = self._steps.get(self._step.value, index)
-        self._steps = choices
-        self._step.options = tuple(choices)
-        put(self._step, value=list(choices)[chosen if index == self._index else index])
-        self._index = index
+        """Follow the course; what somebody picked stays theirs while it goes on by itself."""
+        if choices != self._steps:
+            self._steps = choices
+            self._step.options = tuple(choices)
+        put(self._step, value=list(choices)[index if self._picked is None else self._picked])
+
+    def _pick(self, label: str) -> None:
+        self._picked = self._steps.get(label, self._picked)
+
+    def _say_redo(self, send: Send) -> None:
+        send(intents.RedoStep(self._steps.get(self._step.value, -1)))
+        self._picked = None
 
     def _uses(self) -> dict[Which, viser.GuiButtonHandle]:
         return {"none": self._none, "again": self._again, "previous": self._previous}

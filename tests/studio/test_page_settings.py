@@ -162,7 +162,7 @@ def test_the_steps_of_calibration_tell_what_is_missing(
     studio: Studio, streaming: Studio, capture: StillCapture
 ) -> None:
     stands = [step.stand for step in calibration_view.steps_of(streaming.tick(TICK_S))]
-    assert stands == ["done", "done", "done", "open"]
+    assert stands == ["done", "done", "done", "open", "open"]
     motion = capture.newest.motion
     assert motion is not None
     doubt = motion.doubt.copy()
