@@ -20,9 +20,15 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 COMMAND = [sys.executable, "-c", "from handstudio.cli import main; main()"]
 
+# Without a graphics card the page itself is drawn fastest by the processor; the scene alone needs
+# WebGL, whose imitation takes both cores for a second a picture, twenty times as long where plots
+# and text go through it too.
 CHROMIUM_ARGUMENTS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
+    "--disable-accelerated-2d-canvas",
     "--no-sandbox",
     "--disable-background-networking",
     "--disable-component-update",
@@ -30,7 +36,21 @@ CHROMIUM_ARGUMENTS = [
     "--no-first-run",
 ]
 
-expect.set_options(timeout=45_000)  # software rendering on two busy cores
+# The scene is drawn only while `window.drawn` says so (page.drawing): whatever else a page does, it
+# then does at once, and the studio beside it has a core for itself. Pictures not drawn leave the
+# last one standing.
+DRAW_WHEN_ASKED = """
+(() => {
+  const scene = WebGL2RenderingContext.prototype;
+  const draw = ["drawArrays", "drawArraysInstanced", "drawElements", "drawElementsInstanced"];
+  for (const name of ["clear", ...draw]) {
+    const really = scene[name];
+    scene[name] = function (...how) { if (window.drawn) really.apply(this, how); };
+  }
+})();
+"""
+
+expect.set_options(timeout=45_000)  # two busy cores
 
 
 @dataclass(frozen=True)
@@ -88,7 +108,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
-    """Open pages; one that logs an error fails the test. Small ones: they are drawn in software."""
+    """Open pages; one that logs an error fails the test. Their scene is drawn when asked."""
     errors: list[str] = []
     contexts = []
 
@@ -96,10 +116,14 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
         studio: RunningStudio, width: int = 1280, height: int = 640, language: str = "en-US"
     ) -> Page:
         context = browser.new_context(
-            viewport={"width": width, "height": height}, accept_downloads=True, locale=language
+            viewport={"width": width, "height": height},
+            device_scale_factor=0.5,  # a quarter of the pixels to draw; places are the same
+            accept_downloads=True,
+            locale=language,
         )
         contexts.append(context)
         page = context.new_page()
+        page.add_init_script(DRAW_WHEN_ASKED)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(studio.url)
         return page

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import PIL.Image
@@ -12,6 +14,15 @@ from playwright.sync_api import Locator, Page, expect
 from app.views.recording import clock_of
 
 CENTRE = {"x": 340, "y": 240, "width": 650, "height": 390}  # between notices and transport
+
+
+@contextmanager
+def drawing(page: Page) -> Iterator[None]:
+    """The scene is drawn as long as this lasts; without, it stands still."""
+    page.evaluate("window.drawn = true")
+    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    yield
+    page.evaluate("window.drawn = false")
 
 
 def look(page: Page) -> np.ndarray:
@@ -27,23 +38,25 @@ def changed(before: np.ndarray, after: np.ndarray) -> float:
 
 def moves_within(page: Page, seconds: float) -> bool:
     """Whether the picture changes clearly in that time."""
-    before = look(page)
-    for _ in range(int(seconds * 2)):
-        page.wait_for_timeout(500)
-        if changed(before, look(page)) > 0.01:
-            return True
+    with drawing(page):
+        before = look(page)
+        for _ in range(int(seconds * 2)):
+            page.wait_for_timeout(500)
+            if changed(before, look(page)) > 0.01:
+                return True
     return False
 
 
 def settles_within(page: Page, seconds: float) -> bool:
     """Whether the picture comes to rest in that time."""
-    before = look(page)
-    for _ in range(int(seconds)):
-        page.wait_for_timeout(1000)
-        now = look(page)
-        if changed(before, now) < 0.001:
-            return True
-        before = now
+    with drawing(page):
+        before = look(page)
+        for _ in range(int(seconds)):
+            page.wait_for_timeout(1000)
+            now = look(page)
+            if changed(before, now) < 0.001:
+                return True
+            before = now
     return False
 
 
