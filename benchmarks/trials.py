@@ -28,7 +28,8 @@ from handstudio.calibration.heading import CALIBRATED
 from handstudio.calibration.quick_start import quick_start
 from handstudio.hand.angles import hand_angles
 from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
-from handstudio.kinematics import HandFit, angles_of, fit_of, measured_angles, pose_of
+from handstudio.hand_fit import HandFit, fit_of
+from handstudio.kinematics import angles_of, measured_angles, pose_of
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.recording.material import material

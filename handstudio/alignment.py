@@ -14,7 +14,7 @@ from handstudio.calibration.quick_start import Labelled, quick_start
 from handstudio.calibration.recorded import even
 from handstudio.errors import CalibrationError
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton
-from handstudio.kinematics import fit_of
+from handstudio.hand_fit import fit_of
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.samples import ImuSamples

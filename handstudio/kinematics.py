@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
-from handstudio.calibration.mounting import nominal_mounting
-from handstudio.calibration.subject import SubjectCalibration
-from handstudio.errors import LayoutError
 from handstudio.hand.angles import (
     ROOT_ANGLES,
     Angle,
@@ -20,75 +16,12 @@ from handstudio.hand.angles import (
     joint_index,
 )
 from handstudio.hand.pose import Pose, posed
-from handstudio.hand.skeleton import (
-    FINGERS,
-    PARENTS,
-    SEGMENTS,
-    HandSide,
-    Skeleton,
-    nominal_skeleton,
-)
+from handstudio.hand.skeleton import PARENTS, SEGMENTS
+from handstudio.hand_fit import HandFit, fit_of
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
 from handstudio.setup import Setup
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HandFit:
-    """What is known of this hand and of how the glove sits on it.
-
-    Attributes:
-        skeleton: Joint centres, segment frames, fingertips.
-        q_sensor_segment: Attitude of each sensor's segment in the sensor.
-    """
-
-    skeleton: Skeleton
-    q_sensor_segment: Float[Array, "s 4"]
-
-
-def fit_of(setup: Setup) -> HandFit:
-    """The hand a setup describes: the calibrated one, else mean proportions of its length.
-
-    Raises:
-        LayoutError: the layout is not a hand's.
-    """
-    if not setup.layout.is_hand:
-        raise LayoutError(
-            "There is no hand in this recording.",
-            "{why} {why.remedy}",
-            why=setup.layout.no_hand,
-        )
-    if setup.subject is not None:
-        return fit_of_calibration(setup.subject, setup.layout)
-    side: HandSide = "left" if setup.layout.side == "left" else "right"
-    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
-    return HandFit(skeleton, nominal_mounting(setup.layout))
-
-
-def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandFit:
-    """The hand a calibration describes, on a glove of this layout.
-
-    A sensor that the calibration does not know sits as the maker meant it.
-    """
-    known = {segment.name: segment for segment in calibration.segments}
-    tips = {tip.finger: tip for tip in calibration.tips}
-    nominal = nominal_skeleton(calibration.side, calibration.hand_length_m)
-    joint, rest = nominal.t_parent_joint.copy(), nominal.q_parent_rest.copy()
-    for index, name in enumerate(SEGMENTS):
-        if name in known:
-            joint[index] = known[name].t_parent_joint
-            rest[index] = known[name].q_parent_rest
-    ends = nominal.t_distal_tip.copy()
-    for index, finger in enumerate(FINGERS):
-        if finger in tips:
-            ends[index] = tips[finger].t_distal_tip
-    q_sensor_segment = nominal_mounting(layout)
-    for sensor, place in enumerate(layout.sensors):
-        segment = known.get(place.segment)
-        if segment is not None and segment.sensor == place.sensor:
-            q_sensor_segment[sensor] = segment.q_sensor_segment
-    return HandFit(Skeleton(calibration.side, joint, rest, ends), q_sensor_segment)
 
 
 def segment_attitudes(

@@ -14,12 +14,14 @@ from typing import Any, Literal
 
 import msgspec
 import numpy as np
-from jaxtyping import Bool, Float, Int64, UInt8
+from jaxtyping import Bool, Float, Float32, Int64, UInt8
 
 from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
 from handstudio.calibration.rest import REST_S, first_rest
 from handstudio.errors import SetupError
+from handstudio.fusion.filter import Fused, WholeFilter
+from handstudio.hand_fit import mechanism_of
 from handstudio.maths import so3
 from handstudio.samples import Event, Gap, ImuSamples, Why
 from handstudio.setup import Setup
@@ -48,6 +50,7 @@ class Motion:
     q_world_sensor: Float[Array, "n s 4"]
     q_world_start: Float[Array, "n 4"]  # first placed attitude of the forearm's sensor; NaN before
     doubt: UInt8[Array, "n s"]
+    sd_rad: Float32[Array, "n s 2"]  # as the filter has it, of an orientation and of it relative
 
     def __len__(self) -> int:
         return len(self.time_us)
@@ -58,6 +61,7 @@ class Motion:
             self.q_world_sensor[part],
             self.q_world_start[part],
             self.doubt[part],
+            self.sd_rad[part],
         )
 
 
@@ -111,6 +115,11 @@ def run(setup: Setup, state: State, events: Iterable[Event]) -> tuple[Motion, St
     return turned(setup, join(motions)), state
 
 
+def unsure(doubt: UInt8[Array, "n s"]) -> Float32[Array, "n s 2"]:
+    """How sure a filter is that does not tell."""
+    return np.full((*doubt.shape, 2), np.inf, dtype=np.float32)
+
+
 def empty(sensors: int) -> Motion:
     """A motion of no instants."""
     return Motion(
@@ -118,6 +127,7 @@ def empty(sensors: int) -> Motion:
         np.empty((0, sensors, 4)),
         np.empty((0, 4)),
         np.empty((0, sensors), dtype=np.uint8),
+        np.empty((0, sensors, 2), dtype=np.float32),
     )
 
 
@@ -129,9 +139,17 @@ def join(motions: list[Motion]) -> Motion:
 
 
 def turned(setup: Setup, motion: Motion) -> Motion:
-    """Orientations whose headings agree (4.22): a turn of each sensor about the vertical."""
-    if not setup.heading_rad:
+    """Orientations whose headings agree (4.22): a turn of each sensor about the vertical.
+
+    A filter that sees the sensors together has them so already.
+    """
+    if not setup.heading_rad or isinstance(setup.filter, WholeFilter):
         return motion
+    return with_headings(setup, motion)
+
+
+def with_headings(setup: Setup, motion: Motion) -> Motion:
+    """A motion with each sensor turned by the setup's heading."""
     turns = so3.about_z(np.array(setup.heading_rad))
     start = motion.q_world_start
     forearm = setup.layout.drivers.get("forearm")
@@ -141,7 +159,21 @@ def turned(setup: Setup, motion: Motion) -> Motion:
     return replace(motion, q_world_sensor=turned, q_world_start=start)
 
 
-_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
+def reheaded(before: Setup, after: Setup, state: State) -> State:
+    """What a state becomes where nothing but the setup's headings changes."""
+    if not isinstance(after.filter, WholeFilter):
+        return state
+    sensors = len(after.layout.sensors)
+    none = (0.0,) * sensors
+    by = np.array(after.heading_rad or none) - np.array(before.heading_rad or none)
+    turns = so3.about_z(by)
+    start, forearm = state.q_world_start, after.layout.drivers.get("forearm")
+    if forearm is not None:
+        start = so3.multiply(turns[forearm], start)
+    return replace(state, filter=after.filter.turned(state.filter, turns), q_world_start=start)
+
+
+_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt", "sd_rad")
 
 
 def _freed(setup: Setup, samples: ImuSamples) -> ImuSamples:
@@ -223,6 +255,8 @@ def _run_placing(
 def _place(setup: Setup, state: State, sensor: int, attitude: Array, bias: Array) -> State:
     placed = state.placed.copy()
     placed[sensor] = True
+    if isinstance(setup.filter, WholeFilter) and setup.heading_rad:
+        attitude = so3.multiply(so3.about_z(np.array(setup.heading_rad[sensor])), attitude)
     start = state.q_world_start
     if sensor == setup.layout.drivers.get("forearm") and not np.isfinite(start).all():
         start = attitude
@@ -235,15 +269,22 @@ def _fuse(
 ) -> State:
     if len(samples) == 0:
         return state
-    orientation, fused = setup.filter.run(state.filter, samples, stretch, samples.valid)
+    given = (state.filter, samples, stretch, samples.valid, mechanism_of(setup))
+    if isinstance(setup.filter, WholeFilter):
+        result: Fused[Any] = setup.filter.fused(*given)
+    else:
+        orientation, after = setup.filter.run(*given)
+        unknown = np.full((*samples.valid.shape, 2), np.inf)
+        result = Fused(orientation, unknown, after)
     doubt = (
         np.where(state.placed, 0, Doubt.UNPLACED)
         | np.where(samples.saturated, Doubt.SATURATED, 0)
         | np.where(samples.valid, 0, Doubt.SILENT)
     ).astype(np.uint8)
     start = np.tile(state.q_world_start, (len(samples), 1))
-    motions.append(Motion(samples.time_us, orientation, start, doubt))
-    return replace(state, filter=fused, last=samples[-1:])
+    sure = result.sd_rad.astype(np.float32)
+    motions.append(Motion(samples.time_us, result.q_world_sensor, start, doubt, sure))
+    return replace(state, filter=result.state, last=samples[-1:])
 
 
 def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> tuple[State, float]:
@@ -267,7 +308,8 @@ def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> 
         saturated=np.zeros((missing, last.gyr.shape[1]), dtype=bool),
     )
     step = periods / (missing + 1)
-    _, fused = setup.filter.run(state.filter, bridge, np.full(missing, step), bridge.valid)
+    steps = np.full(missing, step)
+    _, fused = setup.filter.run(state.filter, bridge, steps, bridge.valid, mechanism_of(setup))
     # a rest may not reach over a gap: nobody knows what happened in it
     return replace(state, filter=fused, recent=_nothing(len(state.placed))), step
 

@@ -34,7 +34,13 @@ Progress: TypeAlias = Callable[[float], None]
 
 _BATCH = 2048  # instants fused at a time: memory does not grow with the take
 
-_KINDS = {"time_us": "<i8", "q_world_sensor": "<f8", "q_world_start": "<f8", "doubt": "u1"}
+_KINDS = {
+    "time_us": "<i8",
+    "q_world_sensor": "<f8",
+    "q_world_start": "<f8",
+    "doubt": "u1",
+    "sd_rad": "<f4",
+}
 
 
 class _Meta(msgspec.Struct):
@@ -250,6 +256,7 @@ def _array(path: Path, kind: str, meta: _Meta) -> Array:
         "q_world_sensor": (n, s, 4),
         "q_world_start": (n, 4),
         "doubt": (n, s),
+        "sd_rad": (n, s, 2),
     }
     shape = shapes[path.name]
     if path.stat().st_size != np.dtype(kind).itemsize * math.prod(shape):

@@ -12,16 +12,18 @@ from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import CalibrationError, SetupError
 from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
+from handstudio.fusion.tree_filter import TreeFilter
 from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.layout import Layout, glove
 from handstudio.protocol.packets import Description, sensor_name
 from handstudio.samples import Ranges
 
-AnyFilter: TypeAlias = VqfFilter | RawFilter | Filter1
+AnyFilter: TypeAlias = TreeFilter | VqfFilter | RawFilter | Filter1
 """The filters a setup can name; each is a struct with a tag of its own."""
 
 FILTERS: dict[str, AnyFilter] = {
+    "tree": TreeFilter(),
     "vqf": VqfFilter(),
     "raw": RawFilter(),
     "filter1": Filter1(),

@@ -10,10 +10,10 @@ from handstudio import alignment, pipeline
 from handstudio.arrays import Array
 from handstudio.errors import CalibrationError, LayoutError
 from handstudio.hand.skeleton import SEGMENTS
-from handstudio.kinematics import fit_of
+from handstudio.hand_fit import fit_of
 from handstudio.layout import glove
 from handstudio.maths import so3
-from handstudio.pipeline import Motion
+from handstudio.pipeline import Motion, unsure
 from handstudio.samples import ImuSamples
 from handstudio.setup import Setup
 from handstudio.simulation.imperfections.strengths import parse
@@ -102,9 +102,8 @@ def test_what_lies_between_two_setups_takes_motion_from_one_to_the_other():
     one, other = (
         msgspec.structs.replace(SETUP, heading_rad=tuple(RNG.normal(size=n))) for _ in range(2)
     )
-    raw = Motion(
-        np.zeros(1, dtype=np.int64), flat()[None], flat()[:1], np.zeros((1, n), dtype=np.uint8)
-    )
+    doubt = np.zeros((1, n), dtype=np.uint8)
+    raw = Motion(np.zeros(1, dtype=np.int64), flat()[None], flat()[:1], doubt, unsure(doubt))
     carried = pipeline.turned(alignment.between(one, other), pipeline.turned(one, raw))
     direct = pipeline.turned(other, raw)
     assert so3.angle_between(carried.q_world_sensor, direct.q_world_sensor).max() < 1e-9

@@ -11,7 +11,7 @@ from handstudio.calibrate import Calibrated, calibrate
 from handstudio.calibration.subject import decode, encode
 from handstudio.errors import CalibrationError
 from handstudio.hand.skeleton import SEGMENTS
-from handstudio.kinematics import fit_of
+from handstudio.hand_fit import fit_of
 from handstudio.recording.notes import Notes, save_notes
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take, open_take

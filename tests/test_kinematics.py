@@ -12,11 +12,11 @@ from handstudio import pipeline
 from handstudio.errors import LayoutError
 from handstudio.hand.angles import ROOT_ANGLES, hand_angles
 from handstudio.hand.skeleton import PARENTS, SEGMENTS
+from handstudio.hand_fit import fit_of
 from handstudio.kinematics import (
     angles_of,
     doubtful_segments,
     exported_angles,
-    fit_of,
     has_start,
     measured_angles,
     pose_of,
@@ -25,7 +25,7 @@ from handstudio.kinematics import (
 )
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.maths import so3
-from handstudio.pipeline import Doubt, Motion
+from handstudio.pipeline import Doubt, Motion, unsure
 from handstudio.setup import HandModel, Setup
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import Truth, signals
@@ -46,7 +46,7 @@ def perfect(truth: Truth) -> Motion:
     n, sensors = truth.q_world_sensor.shape[:2]
     start = np.tile(World().q_world_start, (n, 1))
     doubt = np.zeros((n, sensors), dtype=np.uint8)
-    return Motion(truth.time_us, truth.q_world_sensor, start, doubt)
+    return Motion(truth.time_us, truth.q_world_sensor, start, doubt, unsure(doubt))
 
 
 def setup_of(layout: Layout) -> Setup:
@@ -157,7 +157,8 @@ NO_HAND = {
 def test_without_a_hand_there_is_no_pose_and_it_says_why(why):
     layout = NO_HAND[why]
     q = np.tile(so3.IDENTITY, (3, len(layout.sensors), 1))
-    motion = Motion(np.arange(3), q, q[:, 0], np.zeros(q.shape[:2], dtype=np.uint8))
+    doubt = np.zeros(q.shape[:2], dtype=np.uint8)
+    motion = Motion(np.arange(3), q, q[:, 0], doubt, unsure(doubt))
     assert measured_angles(layout) == ()
     for ask in (
         lambda: pose_of(setup_of(layout), q),

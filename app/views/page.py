@@ -19,7 +19,8 @@ from handstudio.device.health import HealthView
 from handstudio.device.orders import Newest, Phase
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import Skeleton
-from handstudio.kinematics import doubtful_segments, fit_of, pose_of
+from handstudio.hand_fit import fit_of
+from handstudio.kinematics import doubtful_segments, pose_of
 from handstudio.layout import Layout
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import Setup

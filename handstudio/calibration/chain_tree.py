@@ -10,6 +10,7 @@ import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis
+from handstudio.calibration.mounting import nominal_places
 from handstudio.calibration.swings import Swings
 from handstudio.hand.skeleton import JOINTS, SEGMENTS, Joint, Skeleton
 
@@ -72,8 +73,6 @@ UNCALIBRATED = Priors(acc_bias=0.1, tilt_rad=float(np.deg2rad(0.7)), model_m=0.0
 
 _OFF_PLANE_M = 1e-5
 _PASSING = ("wrist", "thumb_cmc")
-_WHERE_ALONG = {"SN1": 0.70, "SN2": 0.78, "SN3": 0.86, "Tip": 1.0}  # of the segment
-_ABOVE_BONE_M = 0.013
 
 
 class Tree:
@@ -130,6 +129,7 @@ def prior_of(
     """Means of all unknowns, and the precision of what is known of them before."""
     size = 3 * len(index)
     mean, precision = np.zeros(size), np.zeros((size, size))
+    places = nominal_places(tree.swings.layout, skeleton)
     for (kind, sensor, joint), at in index.items():
         part = slice(at, at + 3)
         if kind == "link":
@@ -139,8 +139,7 @@ def prior_of(
             precision[part, part] = np.eye(3) / sd**2
         elif kind == "sensor":
             far = skeleton.t_far_end[SEGMENTS.index(tree.segment[sensor])]
-            name = tree.swings.layout.sensors[sensor].sensor
-            mean[part] = _WHERE_ALONG.get(name, 0.5) * far + [0.0, 0.0, _ABOVE_BONE_M]
+            mean[part] = places[sensor]
             lengthwise = max(priors.along_share * float(np.linalg.norm(far)), priors.height_m)
             precision[part, part] = np.diag(
                 [priors.lateral_m**-2, lengthwise**-2, priors.height_m**-2]

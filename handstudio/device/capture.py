@@ -513,7 +513,9 @@ class Capture:
             after, _ = self._known.on(setup)
             motion = self.newest.motion
             if motion is not None:
-                motion = pipeline.turned(alignment.between(setup, after), motion)
+                motion = pipeline.with_headings(alignment.between(setup, after), motion)
+            if self._state is not None:
+                self._state = pipeline.reheaded(setup, after, self._state)
             self.newest = replace(self.newest, setup=after, motion=motion)
 
     def _reset_heading(self, sensor: str | None) -> None:

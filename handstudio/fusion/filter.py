@@ -7,11 +7,13 @@ magnetic field.
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar, runtime_checkable
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
+from handstudio.fusion.mechanism import Mechanism
 from handstudio.samples import ImuSamples
 
 State = TypeVar("State")
@@ -50,6 +52,7 @@ class Filter(Protocol[State]):
         samples: ImuSamples,
         stretch: Float[Array, " n"],
         heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
     ) -> tuple[Float[Array, "n s 4"], State]:
         """Fuse consecutive samples.
 
@@ -58,6 +61,8 @@ class Filter(Protocol[State]):
             samples: No instant missing between them.
             stretch: Length of the step that leads to each sample, in nominal sample periods.
             heeded: Where a sensor's reading is used; elsewhere its orientation is held.
+            mechanism: What joins the sensors; None: nothing, and filters of single sensors do
+                not ask.
 
         Returns:
             Orientation after each sample, and the state to go on from. Cutting ``samples``
@@ -76,3 +81,43 @@ class Filter(Protocol[State]):
             SetupError: these bytes are not a state of this filter.
         """
         ...
+
+
+@runtime_checkable
+class WholeFilter(Filter[State], Protocol[State]):
+    """A filter that sees the sensors together: in one world, and knowing how sure it is.
+
+    What others leave to a turn afterwards (4.22) must be right within it: its states and results
+    are in the world that `Mechanism.heading_rad` turns all sensors into.
+    """
+
+    def fused(
+        self,
+        state: State,
+        samples: ImuSamples,
+        stretch: Float[Array, " n"],
+        heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
+    ) -> Fused[State]:
+        """As `run`, and how sure it is."""
+        ...
+
+    def turned(self, state: State, turns: Float[Array, "s 4"]) -> State:
+        """The state with sensors turned in the world: ``q_world_sensor = turns q_world_sensor``."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fused(Generic[State]):
+    """What comes out of a filter that knows how sure it is.
+
+    Attributes:
+        q_world_sensor: Orientation after each sample.
+        sd_rad: Standard deviation about any axis [rad]: of an orientation, and of that relative to
+            the sensor before its joint.
+        state: To go on from.
+    """
+
+    q_world_sensor: Float[Array, "n s 4"]
+    sd_rad: Float[Array, "n s 2"]
+    state: State

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
 from handstudio.fusion import euler
+from handstudio.fusion.mechanism import Mechanism
 from handstudio.fusion.steps import first, steps_of
 from handstudio.samples import ImuSamples
 
@@ -76,6 +77,7 @@ class RawFilter(msgspec.Struct, frozen=True, tag="raw"):
         samples: ImuSamples,
         stretch: Float[Array, " n"],
         heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
     ) -> tuple[Float[Array, "n s 4"], RawState]:
         """Sum consecutive samples."""
         steps = steps_of(samples, stretch, heeded, state.period_s, state.gyr_bias)

@@ -18,6 +18,7 @@ from vqf import VQF
 
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
+from handstudio.fusion.mechanism import Mechanism
 from handstudio.maths import so3
 from handstudio.samples import ImuSamples
 
@@ -104,6 +105,7 @@ class VqfFilter(msgspec.Struct, frozen=True, tag="vqf"):
         samples: ImuSamples,
         stretch: Float[Array, " n"],
         heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
     ) -> tuple[Float[Array, "n s 4"], VqfState]:
         """Fuse consecutive samples, sensor by sensor."""
         # VQF's period is fixed; a stretched step turns the gyroscope's reading into the same angle

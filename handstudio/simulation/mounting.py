@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
+from handstudio.calibration.mounting import WHERE_ALONG
 from handstudio.errors import LayoutError
 from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
 from handstudio.layout import Layout
@@ -20,9 +21,6 @@ _HEIGHT_OF_PHALANX_M = {"proximal": 0.012, "intermediate": 0.011, "distal": 0.00
 # How a glove sits on a person, on every donning; ours, judged by eye.
 _TILT_DEG = (4.0, 6.0, 4.0)  # about the segment's x, y and z: skin slopes, boards twist
 _SHIFT_M = (0.002, 0.003, 0.001)
-
-# Share of the segment's length; whatever is not named sits in the middle.
-_ALONG = {"SN1": 0.70, "SN2": 0.78, "SN3": 0.86, "Tip": 1.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +43,7 @@ def nominal_mounting(layout: Layout, skeleton: Skeleton) -> Mounting:
     places = []
     for place, segment in zip(layout.sensors, segment_indices(layout), strict=True):
         height = np.array([0.0, 0.0, _height_m(place.segment)])
-        places.append(_ALONG.get(place.sensor, 0.5) * far[segment] + height)
+        places.append(WHERE_ALONG.get(place.sensor, 0.5) * far[segment] + height)
     return Mounting(np.tile(so3.IDENTITY, (len(places), 1)), np.array(places))
 
 

@@ -18,7 +18,7 @@ from handstudio.calibration.subject import (
 )
 from handstudio.hand.angles import hand_angles, joint_angles
 from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton, nominal_skeleton
-from handstudio.kinematics import fit_of_calibration
+from handstudio.hand_fit import fit_of_calibration
 from handstudio.layout import glove
 from handstudio.maths import so3
 

@@ -455,7 +455,7 @@ class Studio:
         return computed
 
 
-_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt")
+_FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt", "sd_rad")
 
 
 def assert_equal_to_the_last_bit(a: Motion, b: Motion) -> None:

@@ -24,7 +24,7 @@ from handstudio.hand.skeleton import FINGERS, JOINTS
 from handstudio.health.record import Episode
 from handstudio.kinematics import angles_of, measured_angles, pose_of, relative_rotations
 from handstudio.layout import JointPlace, Layout, SensorPlace
-from handstudio.pipeline import Motion
+from handstudio.pipeline import Motion, unsure
 from handstudio.process import process
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.simulated import rehearse, simulate
@@ -67,7 +67,7 @@ def door(tmp_path) -> tuple[Take, Motion]:
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
     doubt = np.array([[0, 0], [1, 0], [3, 8], [0, 4], [0, 0]], dtype=np.uint8)
     time_us = np.array([5_000_000, 5_020_000, 5_040_001, 5_100_000, 5_120_000])
-    return take, Motion(time_us, q, np.full((5, 4), np.nan), doubt)
+    return take, Motion(time_us, q, np.full((5, 4), np.nan), doubt, unsure(doubt))
 
 
 def read(path: Path) -> tuple[list[str], np.ndarray]:

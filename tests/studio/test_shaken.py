@@ -8,7 +8,7 @@ import pytest
 from app import shaken
 from app.review import Review
 from handstudio.maths import so3
-from handstudio.pipeline import Doubt, Motion
+from handstudio.pipeline import Doubt, Motion, unsure
 
 SENSORS = 20
 
@@ -26,7 +26,7 @@ def turned(time_us: np.ndarray, hz: float, degrees: float) -> np.ndarray:
 
 def motion(time_us: np.ndarray, q: np.ndarray) -> Motion:
     doubt = np.full((len(time_us), SENSORS), Doubt(0), dtype=np.uint8)
-    return Motion(time_us, q, np.tile(so3.IDENTITY, (len(time_us), 1)), doubt)
+    return Motion(time_us, q, np.tile(so3.IDENTITY, (len(time_us), 1)), doubt, unsure(doubt))
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 100.0, 1000.0])

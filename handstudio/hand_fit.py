@@ -1,0 +1,198 @@
+"""The hand that a setup describes, and the mechanism that its sensors sit on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float
+
+from handstudio.arrays import Array
+from handstudio.calibration.mounting import nominal_mounting, nominal_places
+from handstudio.calibration.subject import SubjectCalibration
+from handstudio.errors import LayoutError
+from handstudio.fusion.mechanism import FREE, Mechanism, bare
+from handstudio.hand.skeleton import (
+    FINGERS,
+    JOINTS,
+    SEGMENTS,
+    HandSide,
+    Skeleton,
+    nominal_skeleton,
+)
+from handstudio.layout import Layout
+from handstudio.maths import so3
+from handstudio.setup import Setup
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandFit:
+    """What is known of this hand and of how the glove sits on it.
+
+    Attributes:
+        skeleton: Joint centres, segment frames, fingertips.
+        q_sensor_segment: Attitude of each sensor's segment in the sensor.
+    """
+
+    skeleton: Skeleton
+    q_sensor_segment: Float[Array, "s 4"]
+
+
+def fit_of(setup: Setup) -> HandFit:
+    """The hand a setup describes: the calibrated one, else mean proportions of its length.
+
+    Raises:
+        LayoutError: the layout is not a hand's.
+    """
+    if not setup.layout.is_hand:
+        raise LayoutError(
+            "There is no hand in this recording.",
+            "{why} {why.remedy}",
+            why=setup.layout.no_hand,
+        )
+    if setup.subject is not None:
+        return fit_of_calibration(setup.subject, setup.layout)
+    side: HandSide = "left" if setup.layout.side == "left" else "right"
+    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
+    return HandFit(skeleton, nominal_mounting(setup.layout))
+
+
+def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandFit:
+    """The hand a calibration describes, on a glove of this layout.
+
+    A sensor that the calibration does not know sits as the maker meant it.
+    """
+    known = {segment.name: segment for segment in calibration.segments}
+    tips = {tip.finger: tip for tip in calibration.tips}
+    nominal = nominal_skeleton(calibration.side, calibration.hand_length_m)
+    joint, rest = nominal.t_parent_joint.copy(), nominal.q_parent_rest.copy()
+    for index, name in enumerate(SEGMENTS):
+        if name in known:
+            joint[index] = known[name].t_parent_joint
+            rest[index] = known[name].q_parent_rest
+    ends = nominal.t_distal_tip.copy()
+    for index, finger in enumerate(FINGERS):
+        if finger in tips:
+            ends[index] = tips[finger].t_distal_tip
+    q_sensor_segment = nominal_mounting(layout)
+    for sensor, place in enumerate(layout.sensors):
+        segment = known.get(place.segment)
+        if segment is not None and segment.sensor == place.sensor:
+            q_sensor_segment[sensor] = segment.q_sensor_segment
+    return HandFit(Skeleton(calibration.side, joint, rest, ends), q_sensor_segment)
+
+
+def mechanism_of(setup: Setup) -> Mechanism:
+    """What joins the sensors of a setup; kept for the setups asked about last."""
+    return _mechanism(_Same(setup))
+
+
+class _Same:
+    """A setup by identity: to compare calibrations costs more than to fuse a sample."""
+
+    __slots__ = ("setup",)
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+
+    def __hash__(self) -> int:
+        return id(self.setup)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.setup is self.setup
+
+
+@lru_cache(maxsize=16)
+def _mechanism(same: _Same) -> Mechanism:
+    setup = same.setup
+    heading = np.array(setup.heading_rad or (0.0,) * len(setup.layout.sensors))
+    if not setup.layout.is_hand:
+        return replace(bare(len(heading)), heading_rad=heading)
+    calibration = setup.subject
+    fit = fit_of(setup)
+    places = nominal_places(setup.layout, fit.skeleton)
+    if calibration is not None:
+        places = _calibrated_places(calibration, setup.layout, fit, places)
+    return hand_mechanism(setup.layout, fit, places, heading, calibration)
+
+
+def hand_mechanism(
+    layout: Layout,
+    fit: HandFit,
+    t_segment_sensor: Float[Array, "s 3"],
+    heading_rad: Float[Array, " s"],
+    calibration: SubjectCalibration | None = None,
+) -> Mechanism:
+    """Joints of a hand as its sensors see them.
+
+    A second sensor on a segment hangs on the first by the segment's own joint: both feel the same
+    acceleration there. Without a calibration axes and places are those of mean proportions.
+    """
+    found = replace(bare(len(layout.sensors)), heading_rad=heading_rad)
+    drivers = layout.drivers
+    joint_before = {joint.child: joint for joint in layout.joints}
+    known = {} if calibration is None else {axis.joint: axis.sd_rad for axis in calibration.axes}
+    for sensor, place in enumerate(layout.sensors):
+        k = SEGMENTS.index(place.segment)
+        q_sensor_segment = fit.q_sensor_segment[sensor]
+        found.q_sensor_joint[sensor] = q_sensor_segment
+        found.t_sensor_joint[sensor] = so3.rotate(q_sensor_segment, -t_segment_sensor[sensor])
+        found.lever_sd_m[sensor] = _LEVER_SD_M[calibration is not None]
+        joint = joint_before.get(place.segment)
+        driver = drivers[place.segment]
+        if driver != sensor:
+            parent, axes, rest, centre = driver, FREE, so3.IDENTITY, np.zeros(3)
+        elif joint is not None and joint.parent in drivers:
+            parent = drivers[joint.parent]
+            axes = FREE if joint.name in _SADDLES else joint.axes
+            rest, centre = fit.skeleton.q_parent_rest[k], fit.skeleton.t_parent_joint[k]
+        else:
+            continue
+        q_parent_segment = fit.q_sensor_segment[parent]
+        found.parent[sensor], found.axes[sensor] = parent, axes
+        found.q_parent_joint[sensor] = so3.multiply(q_parent_segment, rest)
+        found.t_parent_joint[sensor] = so3.rotate(
+            q_parent_segment, centre - t_segment_sensor[parent]
+        )
+        if joint is not None and driver == sensor:
+            found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
+    return found
+
+
+_SADDLES = ("thumb_cmc",)
+"""Joints whose two axes turn the bone about its own as well: opposition."""
+
+_LEVER_SD_M = {False: 0.010, True: 0.003}
+_AXIS_SD_NOMINAL = float(np.deg2rad(8.0))
+_SKIN_SD = float(np.deg2rad(1.0))
+"""How far skin turns a board off its bone about other axes than the joint's."""
+
+_OFF_AXES_SD = float(np.deg2rad(4.0))
+"""How far a joint of two axes turns about the third; capsules give."""
+
+_FOREARM_LAG_SD = float(np.deg2rad(12.0))
+"""Skin of the forearm stays behind when it turns about its long axis."""
+
+
+def _axis_sd(joint: str, axes: int, known: dict[str, float], calibrated: bool) -> float:
+    own = known.get(joint, _AXIS_SD_NOMINAL) if calibrated else _AXIS_SD_NOMINAL
+    parts = [own, _SKIN_SD]
+    if axes > 1:
+        parts.append(_FOREARM_LAG_SD if joint == "wrist" else _OFF_AXES_SD)
+    return float(np.linalg.norm(parts))
+
+
+def _calibrated_places(
+    calibration: SubjectCalibration, layout: Layout, fit: HandFit, nominal: Array
+) -> Array:
+    """Where sensors sit on their segments: as measured, where that was done."""
+    places = nominal.copy()
+    own_joint = {joint.child: joint.name for joint in JOINTS}
+    found = {(centre.joint, centre.sensor): centre.from_centre_m for centre in calibration.centres}
+    for sensor, place in enumerate(layout.sensors):
+        centre = found.get((own_joint[place.segment], place.sensor))
+        if centre is not None:
+            q_segment_sensor = so3.conjugate(fit.q_sensor_segment[sensor])
+            places[sensor] = so3.rotate(q_segment_sensor, np.array(centre))
+    return places
