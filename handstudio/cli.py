@@ -42,7 +42,7 @@ from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import health_of_take
 from handstudio.settings import load_settings, settings_path
-from handstudio.setup import HandModel, Setup, filter_named
+from handstudio.setup import HandModel, Setup, filter_named, smoothing
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 CONNECT_S = 25.0
@@ -172,6 +172,7 @@ def process(
     takes: Annotated[tuple[Path, ...], tyro.conf.Positional],
     *,
     filter: str | None = None,
+    smooth: bool = False,
     from_start: bool = False,
     calibration: str | None = None,
     sensors: str | None = None,
@@ -183,7 +184,8 @@ def process(
 
     Args:
         takes: The takes.
-        filter: Another filter than the take was recorded with (vqf, raw, filter1).
+        filter: Another filter than the take was recorded with (tree, vqf, raw, filter1).
+        smooth: Take in what came after every instant as well: the tree filter's smoother.
         from_start: Ignore what the studio knew before the first byte of the take.
         calibration: File of another subject calibration than the take carries, or none.
         sensors: File of another calibration of the sensors than the take carries, or none.
@@ -201,6 +203,8 @@ def process(
             setup = _aligned(take, setup)
         if filter is not None:
             setup = msgspec.structs.replace(setup, filter=filter_named(filter))
+        if smooth:
+            setup = smoothing(setup)
         with progress(path.name, quiet=json) as share:
             motion = process_take(take, setup, from_start=from_start, progress=share)
         result: dict[str, Any] = {"take": str(path), "instants": len(motion)}

@@ -28,6 +28,7 @@ from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
 from handstudio.samples import Event, ImuSamples
 from handstudio.setup import Setup
+from handstudio.smoothing import Smoother
 
 Progress: TypeAlias = Callable[[float], None]
 """Told the share that is done, 0 to 1."""
@@ -185,11 +186,17 @@ def _fill(
     state = _first_state(take, setup, from_start)
     whole = max(1, take.summary.bytes if take.summary else take.path.stat().st_size)
     seen = 0
+    smoother = Smoother(setup) if setup.smooth else None
     for batch in _batches(take.events(from_start)):
-        motion, state = pipeline.run(setup, state, batch)
+        if smoother is None:
+            motion, state = pipeline.run(setup, state, batch)
+        else:
+            motion, state = smoother.run(state, batch)
         writer.append(motion)
         seen += sum(_size(event, take.header.kind) for event in batch)
         progress(min(1.0, seen / whole))
+    if smoother is not None:
+        writer.append(smoother.rest())
     progress(1.0)
 
 

@@ -68,6 +68,7 @@ class Setup(msgspec.Struct, frozen=True):
         heading_rad: By how much each sensor's orientation is turned about the vertical after
             fusion, in the order of the layout (4.22); empty: not at all.
         subject: The wearer's own hand, and how the glove sits on it; None: ``hand`` and the maker.
+        smooth: Let a recorded take be fused with its future; nothing live does.
     """
 
     layout: Layout
@@ -83,6 +84,7 @@ class Setup(msgspec.Struct, frozen=True):
     sensors: DeviceCalibration | None = None
     heading_rad: tuple[float, ...] = ()
     subject: SubjectCalibration | None = None
+    smooth: bool = False
 
     @property
     def key(self) -> str:
@@ -145,6 +147,12 @@ def calibrated(
         zero=NOMINAL_ZERO if subject is None else "flat hand, functional axes",
         calibration=NO_CALIBRATION if subject is None else subject.id,
     )
+
+
+def smoothing(setup: Setup) -> Setup:
+    """The setup whose takes are fused with their future in mind, by the tree filter."""
+    known = setup.filter if isinstance(setup.filter, TreeFilter) else TreeFilter()
+    return msgspec.structs.replace(setup, filter=known, smooth=True)
 
 
 def filter_named(name: str) -> AnyFilter:

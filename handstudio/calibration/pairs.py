@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.signal import find_peaks
 
 from handstudio.arrays import Array
 from handstudio.calibration.rigid_rotation import (
@@ -84,6 +83,8 @@ def turning_points(rotation: RigidRotation) -> Int[Array, " m"]:
     """Instants at which a swing turns back: minima of ``|omega|`` near zero."""
     rate = np.linalg.norm(rotation.gyr, axis=1)
     usual = float(np.sqrt((rate[rotation.used] ** 2).mean()))
+    from scipy.signal import find_peaks  # noqa: PLC0415 - takes a second to load
+
     found, _ = find_peaks(-rate, height=-_NEAR_ZERO * usual, prominence=_DEEP * usual)
     return np.asarray(found[rotation.used[found]])
 

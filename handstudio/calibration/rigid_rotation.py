@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.signal import savgol_filter
 
 from handstudio.arrays import Array
 from handstudio.errors import CalibrationError
@@ -156,6 +155,8 @@ def smoothed(
             count=len(gyr),
             least=2 * reach + _SLOPE + 1,
         )
+    from scipy.signal import savgol_filter  # noqa: PLC0415 - takes a second to load
+
     acc, gyr = (savgol_filter(v, width, 2, axis=0) for v in (acc, gyr))
     domega = savgol_filter(gyr, _SLOPE, _SLOPE - 1, deriv=1, delta=1.0 / rate_hz, axis=0)
     bad = np.zeros(len(gyr), dtype=bool) if good is None else ~good

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import savgol_filter
 
 from handstudio.arrays import Array
 from handstudio.calibration.attitudes import attitudes_between_rests, unbiased
@@ -162,6 +161,8 @@ def smooth(
 ) -> Float[Array, "n *b"]:
     """Low-passed, or its derivative, by local polynomials (Savitzky and Golay 1964)."""
     length = max(5, 2 * round(0.5 * stretch_s * rate_hz) + 1)
+    from scipy.signal import savgol_filter  # noqa: PLC0415 - takes a second to load
+
     out: Array = savgol_filter(x, length, 4, deriv=derivative, delta=1.0 / rate_hz, axis=0)
     return out
 

@@ -70,9 +70,7 @@ def _remember(st, gyr, acc, mag, flags):
 
 def _stamp() -> int:
     """A number that changes with any of the code that is compiled into the loop."""
-    known = [
-        module for module in (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
-    ]
+    known = (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
     code = [
         (kernel.py_func.__code__.co_code, repr(kernel.py_func.__code__.co_consts))
         for names in (*map(vars, known), globals())

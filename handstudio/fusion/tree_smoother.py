@@ -1,0 +1,126 @@
+"""The smoother: what the tree filter knew at every step, with what came after taken in.
+
+Rauch, Tung and Striebel's backward pass. From one instant to the next errors stay but for what the
+step adds, ``x_k+1 = x_k + n``, ``n`` of variance Q, so the smoothed error of the instant before is
+
+    x_k = x_k|k + (1 - Q S) d,      d = x_k+1 - x_k+1|k
+
+with S the inverse of the covariance before the correction, which the filter's tree gives as a sum
+over sensors: nothing of the size of the whole hand is ever inverted. Biases stay as the filter had
+them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from handstudio.arrays import Array
+from handstudio.fusion.filter import Fused
+from handstudio.fusion.mechanism import Mechanism
+from handstudio.fusion.tree_filter import Tape, TreeFilter, TreeState
+from handstudio.samples import ImuSamples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """Steps that follow one another.
+
+    Attributes:
+        q_world_sensor: What the filter gave out after each.
+        tape: What it kept of each.
+        shown: Whether its instants are in the motion; over missing ones it only steps.
+    """
+
+    q_world_sensor: Float[Array, "n s 4"]
+    tape: Tape
+    shown: bool
+
+
+class Taping:
+    """A tree filter that keeps what a smoother needs, for as long as nobody takes it.
+
+    It stands in a setup for the filter it tapes; a None among the stretches is a new beginning.
+    """
+
+    def __init__(self, filter: TreeFilter) -> None:
+        self._filter = filter
+        self.stretches: list[Stretch | None] = []
+        self.begin, self.place = filter.begin, filter.place
+        self.turned, self.pack, self.unpack = filter.turned, filter.pack, filter.unpack
+
+    def restart(self, state: TreeState) -> TreeState:
+        """As the filter does; nothing is carried back over it."""
+        self.stretches.append(None)
+        return self._filter.restart(state)
+
+    def run(
+        self,
+        state: TreeState,
+        samples: ImuSamples,
+        stretch: Float[Array, " n"],
+        heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
+    ) -> tuple[Float[Array, "n s 4"], TreeState]:
+        """Steps over missing instants."""
+        fused = self._taped(state, samples, stretch, heeded, mechanism, shown=False)
+        return fused.q_world_sensor, fused.state
+
+    def fused(
+        self,
+        state: TreeState,
+        samples: ImuSamples,
+        stretch: Float[Array, " n"],
+        heeded: Bool[Array, "n s"],
+        mechanism: Mechanism | None = None,
+    ) -> Fused[TreeState]:
+        """Steps whose instants are in the motion."""
+        return self._taped(state, samples, stretch, heeded, mechanism, shown=True)
+
+    def _taped(
+        self,
+        state: TreeState,
+        samples: ImuSamples,
+        stretch: Array,
+        heeded: Array,
+        mechanism: Mechanism | None,
+        *,
+        shown: bool,
+    ) -> Fused[TreeState]:
+        fused, tape = self._filter.recorded(state, samples, stretch, heeded, mechanism)
+        self.stretches.append(Stretch(fused.q_world_sensor, tape, shown))
+        return fused
+
+
+def smoothed(stretches: Sequence[Stretch | None], mechanism: Mechanism) -> Float[Array, "n s 4"]:
+    """Orientations of all shown instants, the future up to the last of them taken in."""
+    parts, unbroken = list[Array](), list[Stretch]()
+    for stretch in (*stretches, None):
+        if stretch is not None:
+            unbroken.append(stretch)
+        elif unbroken:
+            parts.append(_backwards(unbroken, mechanism))
+            unbroken = []
+    return np.concatenate(parts) if parts else np.empty((0, mechanism.sensors, 4))
+
+
+def _backwards(stretches: list[Stretch], mechanism: Mechanism) -> Array:
+    out = np.concatenate([s.q_world_sensor for s in stretches])
+    tapes = [np.concatenate([getattr(s.tape, name) for s in stretches]) for name in Tape.__slots__]
+    shown = np.concatenate([np.full(len(s.q_world_sensor), s.shown) for s in stretches])
+    result = out.copy()
+    _kernel()(mechanism.parent, out, *tapes, result)
+    kept: Array = result[shown]
+    return kept
+
+
+@no_type_check
+def _kernel():
+    """The loop, compiled when it is first asked for."""
+    from handstudio.fusion.tree_backward import backward  # noqa: PLC0415 - numba takes a second
+
+    return backward
