@@ -151,7 +151,7 @@ def test_axes_of_perfect_sensors_are_the_frames_own() -> None:
 
 def test_frames_are_the_persons_own_where_they_were_swung() -> None:
     it = done("ideal")
-    for name in ("index_proximal", "index_intermediate"):
+    for name in ("index_proximal", "index_intermediate", "index_distal"):
         k = SEGMENTS.index(name)
         sensor = it.hand.frames.driver[k]
         assert sensor is not None
