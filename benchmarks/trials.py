@@ -28,6 +28,7 @@ from handstudio.calibration.heading import CALIBRATED
 from handstudio.calibration.quick_start import quick_start
 from handstudio.hand.angles import hand_angles
 from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
+from handstudio.hand.skin import skin_of
 from handstudio.kinematics import HandFit, angles_of, fit_of, measured_angles, pose_of
 from handstudio.layout import glove
 from handstudio.maths import so3
@@ -174,7 +175,12 @@ def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, Han
         opening = corrected(opening, known, setup.layout.names)
     alignment, _ = quick_start(opening, setup.layout.names, tolerances=CALIBRATED)
     setup = msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
-    return setup, HandFit(skeleton, q_sensor_segment)
+    rocking = [
+        (setup.layout.sensors[sensor].segment, joint, share)
+        for (sensor, joint), share in hand.rocking.items()
+    ]
+    skin = skin_of(rocking, by_hand="wrist" in hand.axes)
+    return setup, HandFit(skeleton, q_sensor_segment, skin)
 
 
 def performance(someone: Subject, motion: str, seed: int) -> Trajectory:

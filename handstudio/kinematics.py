@@ -22,12 +22,14 @@ from handstudio.hand.angles import (
 from handstudio.hand.pose import Pose, posed
 from handstudio.hand.skeleton import (
     FINGERS,
+    JOINTS,
     PARENTS,
     SEGMENTS,
     HandSide,
     Skeleton,
     nominal_skeleton,
 )
+from handstudio.hand.skin import Skin, skin_of, taken_off
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
@@ -41,10 +43,12 @@ class HandFit:
     Attributes:
         skeleton: Joint centres, segment frames, fingertips.
         q_sensor_segment: Attitude of each sensor's segment in the sensor.
+        skin: How boards move on the bones; None: nothing is known of it.
     """
 
     skeleton: Skeleton
     q_sensor_segment: Float[Array, "s 4"]
+    skin: Skin | None = None
 
 
 def fit_of(setup: Setup) -> HandFit:
@@ -88,7 +92,22 @@ def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandF
         segment = known.get(place.segment)
         if segment is not None and segment.sensor == place.sensor:
             q_sensor_segment[sensor] = segment.q_sensor_segment
-    return HandFit(Skeleton(calibration.side, joint, rest, ends), q_sensor_segment)
+    skeleton = Skeleton(calibration.side, joint, rest, ends)
+    return HandFit(skeleton, q_sensor_segment, skin_of_calibration(calibration, layout))
+
+
+def skin_of_calibration(calibration: SubjectCalibration, layout: Layout) -> Skin:
+    """What a calibration tells of skin, as far as this layout's sensors are the ones it knows."""
+    names, drivers = layout.names, layout.drivers
+    on = {
+        s.sensor: s.name
+        for s in calibration.segments
+        if s.name in drivers and names[drivers[s.name]] == s.sensor
+    }
+    joints = {joint.name for joint in JOINTS if {joint.parent, joint.child} <= set(on.values())}
+    rocking = [(on[r.sensor], r.joint, r.share) for r in calibration.rocking if r.sensor in on]
+    swung = {axis.joint for axis in calibration.axes} & joints
+    return skin_of([rock for rock in rocking if rock[1] in joints], by_hand="wrist" in swung)
 
 
 def segment_attitudes(
@@ -96,7 +115,7 @@ def segment_attitudes(
 ) -> Float[Array, "n k 4"]:
     """Attitude of every segment: by its own sensor, else carried along by its parent at rest.
 
-    ``fit`` is the setup's own unless given, here and below.
+    What is known of skin is taken off. ``fit`` is the setup's own unless given, here and below.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -108,6 +127,8 @@ def segment_attitudes(
     driven = [index for index, name in enumerate(SEGMENTS) if name in drivers]
     sensors = [drivers[SEGMENTS[index]] for index in driven]
     out[:, driven] = so3.multiply(q_world_sensor[:, sensors], q_sensor_segment[sensors])
+    if fit.skin is not None:
+        out = taken_off(fit.skin, skeleton, out)
     for index in sorted(set(range(len(SEGMENTS))) - set(driven)):
         out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
     return out
@@ -144,6 +165,8 @@ def angles_of(
     fit: HandFit | None = None,
 ) -> Float[Array, "n a"]:
     """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start.
+
+    The start is as the forearm's own sensor had it: a hand that lies flat then drags no skin.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -184,7 +207,10 @@ def relative_rotations(
 
 
 def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
-    """Whether a segment's attitude is in doubt; one without a sensor is as its parent."""
+    """Whether a segment's attitude is in doubt; one without a sensor is as its parent.
+
+    Where the hand tells how the forearm is turned, doubt of the hand is the forearm's too.
+    """
     drivers = setup.layout.drivers
     out = np.zeros((len(doubt), len(SEGMENTS)), dtype=bool)
     for index, name in enumerate(SEGMENTS):
@@ -192,4 +218,6 @@ def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
             out[:, index] = doubt[:, drivers[name]] != 0
         elif PARENTS[index] >= 0:
             out[:, index] = out[:, PARENTS[index]]
+    if setup.subject is not None and skin_of_calibration(setup.subject, setup.layout).by_hand:
+        out[:, SEGMENTS.index("forearm")] |= out[:, SEGMENTS.index("hand")]
     return out

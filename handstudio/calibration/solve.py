@@ -17,6 +17,7 @@ from handstudio.calibration.subject import (
     Axis,
     Centre,
     Quaternion,
+    Rock,
     Segment,
     Source,
     Tip,
@@ -92,6 +93,11 @@ class Found:
             name = self.swings.layout.names[sensor]
             out.append(Axis(joint, name, _vector(axis.seen_from(self.swings, sensor)), axis.sd_rad))
         return tuple(out)
+
+    def rocks(self) -> tuple[Rock, ...]:
+        """How boards rock with the joints beside them, as far as it could be told."""
+        names = self.swings.layout.names
+        return tuple(Rock(names[s], joint, share) for (s, joint), share in self.rocking.items())
 
 
 def found(swings: Swings, side: HandSide, hand_length_m: float, priors: Priors = USUAL) -> Found:

@@ -166,6 +166,8 @@ def test_a_board_that_rocks_is_noticed() -> None:
     true = it.worn.skin.tilts[0, proximal, 0]
     # flexion turns about minus x, and the axis found is the one of extension
     assert abs(found_rocking[proximal, "index_mcp"] - true) < 0.01
+    kept = {(rock.sensor, rock.joint): rock.share for rock in it.hand.rocks()}
+    assert abs(kept["SN15", "index_mcp"] - true) < 0.01
 
 
 def test_what_was_not_swung_rests_on_proportions_and_says_so() -> None:
