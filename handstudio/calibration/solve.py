@@ -12,7 +12,7 @@ from handstudio.calibration.axes import JointAxis, flexion_axis
 from handstudio.calibration.chain import Chain, solved
 from handstudio.calibration.chain_tree import USUAL, Priors
 from handstudio.calibration.frames import Frames, framed
-from handstudio.calibration.rocking import Rocking, rocking, steadied
+from handstudio.calibration.rocking import Rocking, leaning, rocking, steadied
 from handstudio.calibration.subject import (
     Axis,
     Centre,
@@ -46,7 +46,7 @@ class Found:
     """What signals say of a hand.
 
     Attributes:
-        swings: The course, sensors freed of rocking.
+        swings: The course, sensors freed of rocking as far as swings alone tell of it.
         axes: Flexion axes by joint.
         rocking: How boards rock.
         chain: Joint centres.
@@ -108,6 +108,7 @@ def found(swings: Swings, side: HandSide, hand_length_m: float, priors: Priors =
     axes = _axes(steady)
     skeleton = nominal_skeleton(side, hand_length_m)
     chain = solved(steady, axes, skeleton, priors)
+    rocks = leaning(steady, axes, chain) | rocks
     return Found(steady, axes, rocks, chain, framed(steady, axes, chain, skeleton), skeleton)
 
 
