@@ -2,8 +2,8 @@
 
 Two things of it can be known from a calibration and from the pose alone. A joint that bends pitches
 the boards beside it, by a share of its turn. And the skin of the forearm stays behind when the
-forearm turns, so the boards on it miss some of that; the hand tells it better, for a wrist hardly
-turns about the forearm's axis (J. Biomech. Eng. 144 (2022) 071007 for both).
+forearm turns, so the boards on it miss some of that; the hand tells it better (both: J. Biomech.
+Eng. 144 (2022) 071007). Here it does as a wrist hardly turns about the forearm's axis.
 """
 
 from __future__ import annotations
