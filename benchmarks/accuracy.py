@@ -137,6 +137,7 @@ def summed(figures: Sequence[Figures]) -> dict[str, Any]:
             "common_heading": float(np.mean([abs(f.heading_offset_deg) for f in figures])),
             "segments": segments,
             "sensors": sensors,
+            **_functional(figures),
         },
         "joint_angle_deg": {
             "mean": float(np.mean(list(angles.values()))),
@@ -151,6 +152,22 @@ def summed(figures: Sequence[Figures]) -> dict[str, Any]:
         "joint_centre_mm": None,  # of a calibration: benchmarks.calibration
         "link_length_mm": None,
         "heading_sd_deg": float(np.mean([f.heading_sd_deg for f in figures])),
+    }
+
+
+def _functional(figures: Sequence[Figures]) -> dict[str, Any]:
+    """Of segments, against frames of the calibration's own definition; nothing without one."""
+    if not figures[0].functional:
+        return {}
+    segments = _means([figure.functional for figure in figures])
+    apart = _means([figure.definition for figure in figures])
+    return {
+        "functional": {
+            "mean": float(np.mean(list(segments.values()))),
+            "worst_segment": max(segments.values()),
+            "segments": segments,
+        },
+        "definition": {"mean": float(np.mean(list(apart.values()))), "segments": apart},
     }
 
 

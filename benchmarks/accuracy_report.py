@@ -21,6 +21,7 @@ def show(found: dict[str, Any]) -> None:
             for what, *path in (
                 ("orientation of segments, mean [deg]", "orientation_deg", "mean"),
                 ("orientation, worst segment [deg]", "orientation_deg", "worst_segment"),
+                *_FUNCTIONAL,
                 ("common heading taken out [deg]", "orientation_deg", "common_heading"),
                 ("joint angles, mean [deg]", "joint_angle_deg", "mean"),
                 ("joint angles, worst [deg]", "joint_angle_deg", "worst_joint"),
@@ -28,6 +29,7 @@ def show(found: dict[str, Any]) -> None:
                 ("fingertips in the hand [mm]", "fingertip_mm", "hand"),
                 ("scatter of headings, SD [deg]", "heading_sd_deg"),
             )
+            if (what, *path) not in _FUNCTIONAL or _at(ours, *path) is not None
         ],
     )
     _show_sensors(found)
@@ -68,6 +70,13 @@ def picture(found: dict[str, Any], path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=90)
     plt.close(figure)
+
+
+_FUNCTIONAL = (
+    ("  against functional frames, mean [deg]", "orientation_deg", "functional", "mean"),
+    ("  worst segment [deg]", "orientation_deg", "functional", "worst_segment"),
+    ("  these against the simulator's frames [deg]", "orientation_deg", "definition", "mean"),
+)
 
 
 def _show_sensors(found: dict[str, Any]) -> None:

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import msgspec
 import numpy as np
+from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
@@ -87,6 +88,26 @@ def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Trut
     priors = ROUGH if known is None else asked.priors
     hand = found(swings, someone.side, someone.hand_length_m, priors)
     return hand, known, truth, labels
+
+
+def functional_frames(
+    someone: Subject, hand: Found, truth: Truth, labels: Labelled
+) -> Float[Array, "k 4"]:
+    """Frames as a calibration lays them, from the truth: attitude in the simulator's own, (k, 4).
+
+    x is the principal axis of a joint's true flexion in the course, z square to it and to the true
+    bone. Where a joint was not swung, or has no sensor, they are the simulator's own.
+    """
+    flat = (hand.swings.flat.start + hand.swings.flat.stop) // 2
+    out = np.tile(so3.IDENTITY, (len(JOINTS), 1))
+    for k, joint in enumerate(JOINTS):
+        if joint.name in hand.axes:
+            x = _true_axis(truth, k, flat, labels)
+            x = x * np.sign(x[0])
+            z = np.cross(x, someone.skeleton.t_far_end[k])
+            z = z / np.linalg.norm(z)
+            out[k] = so3.from_matrix(np.stack([x, np.cross(z, x), z], axis=-1))
+    return out
 
 
 def _sensors(someone: Subject, asked: Asked) -> DeviceCalibration:

@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from benchmarks.calibrated import Asked, calibrated_hand
+from benchmarks.calibrated import Asked, calibrated_hand, functional_frames
 from handstudio import pipeline
 from handstudio.analysis.hand_error import (
     HandPoints,
@@ -28,6 +28,7 @@ from handstudio.calibration.heading import CALIBRATED
 from handstudio.calibration.quick_start import quick_start
 from handstudio.hand.angles import hand_angles
 from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
+from handstudio.hand.skin import skin_of
 from handstudio.hand_fit import HandFit, fit_of
 from handstudio.kinematics import angles_of, measured_angles, pose_of
 from handstudio.layout import glove
@@ -77,7 +78,9 @@ class Figures(msgspec.Struct, frozen=True):
         heading_offset_deg: Taken out of all orientations alike.
         heading_sd_deg: Scatter of the sensors' mean headings.
         sensors: Total, heading and inclination of every sensor.
-        segments: Total of every segment that carries a sensor.
+        segments: Total of every segment that carries a sensor, against the simulator's frames.
+        functional: The same against frames by true functional axes; with ``own`` alone.
+        definition: How far these are from the simulator's; with ``own`` alone.
         angles: Of every joint angle.
         tips_elbow, tips_hand: Of every fingertip, thumb to little finger.
         places_elbow: Of every sensor, from the elbow.
@@ -92,6 +95,8 @@ class Figures(msgspec.Struct, frozen=True):
     tips_elbow: tuple[float, ...]
     tips_hand: tuple[float, ...]
     places_elbow: dict[str, float]
+    functional: dict[str, float] = {}
+    definition: dict[str, float] = {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +110,7 @@ class Followed:
     motion: pipeline.Motion
     compared: Array = field(repr=False)  # which instants
     own: HandFit | None = None  # the hand as a course before found it
+    q_segment_functional: Array | None = field(default=None, repr=False)  # true axes of that course
 
     @property
     def fit(self) -> HandFit:
@@ -144,9 +150,9 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
         sensed, wearing = sense(worn, wearing, performed, index * (1_000_000 // RATE_HZ), RATE_HZ)
         runs.append(sensed.samples)
         truths.append(sensed.truth)
-    own = None
+    own, functional = None, None
     if trial.calibration == "own":
-        setup, own = _own(trial, setup, runs)
+        setup, own, functional = _own(trial, setup, runs)
     state = pipeline.begin(setup)
     for samples in runs:
         motion, state = pipeline.run(setup, state, [samples])
@@ -154,12 +160,18 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
     truth = _joined(truths)
     time_s = truth.time_us * 1e-6
     compared = time_s >= _begins_s(performed)
-    return Followed(worn, setup, performed, truth, pipeline.join(motions), compared, own)
+    motion = pipeline.join(motions)
+    return Followed(worn, setup, performed, truth, motion, compared, own, functional)
 
 
-def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, HandFit]:
-    """What a course of the same person, in the same donning, found; headings by the quick start."""
-    hand, known, _, _ = calibrated_hand(Asked(trial.person, trial.seed, trial.imperfections))
+def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, HandFit, Array]:
+    """What a course of the same person, in the same donning, found; headings by the quick start.
+
+    And frames by the true functional axes of that course, in the simulator's own.
+    """
+    asked = Asked(trial.person, trial.seed, trial.imperfections)
+    hand, known, course, labels = calibrated_hand(asked)
+    functional = functional_frames(subject(trial.person), hand, course, labels)
     frames = hand.frames
     skeleton = Skeleton(
         trial.side, frames.t_parent_joint, frames.q_parent_rest, frames.t_distal_tip
@@ -175,7 +187,12 @@ def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, Han
         opening = corrected(opening, known, setup.layout.names)
     alignment, _ = quick_start(opening, setup.layout.names, tolerances=CALIBRATED)
     setup = msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
-    return setup, HandFit(skeleton, q_sensor_segment)
+    rocking = [
+        (setup.layout.sensors[sensor].segment, joint, share)
+        for (sensor, joint), share in hand.rocking.items()
+    ]
+    skin = skin_of(rocking, by_hand="wrist" in hand.axes)
+    return setup, HandFit(skeleton, q_sensor_segment, skin), functional
 
 
 def performance(someone: Subject, motion: str, seed: int) -> Trajectory:
@@ -193,11 +210,16 @@ def compare(followed: Followed, calibration: Calibration) -> Figures:
     )
     pose = pose_of(followed.setup, motion.q_world_sensor, fit)
     driven = [SEGMENTS.index(name) for name in followed.setup.layout.drivers]
-    segments = sensor_errors(
-        [SEGMENTS[k] for k in driven],
-        truth.q_world_segment[part][:, driven],
-        pose.q_world_segment[:, driven],
-    )
+    q_true, q_got = truth.q_world_segment[part][:, driven], pose.q_world_segment[:, driven]
+    names = [SEGMENTS[k] for k in driven]
+    segments = _in_degrees(sensor_errors(names, q_true, q_got))
+    functional, definition = dict[str, float](), dict[str, float]()
+    if followed.q_segment_functional is not None:
+        frames = followed.q_segment_functional[driven]
+        against = sensor_errors(names, so3.multiply(q_true, frames), q_got)
+        functional = {k: v[0] for k, v in _in_degrees(against).items()}
+        apart = np.rad2deg(so3.angle_between(frames, so3.IDENTITY))
+        definition = dict(zip(names, apart.tolist(), strict=True))
     known = measured_angles(followed.setup.layout)
     columns = [hand_angles().index(angle) for angle in known]
     angles = angle_errors(
@@ -223,11 +245,13 @@ def compare(followed: Followed, calibration: Calibration) -> Figures:
         heading_offset_deg=float(np.rad2deg(sensors.heading_offset)),
         heading_sd_deg=_scatter(truth, motion, part),
         sensors=_in_degrees(sensors),
-        segments={k: v[0] for k, v in _in_degrees(segments).items()},
+        segments={k: v[0] for k, v in segments.items()},
         angles=dict(zip(angles.names, np.rad2deg(angles.rmse).tolist(), strict=True)),
         tips_elbow=tuple(1e3 * x for x in tips.from_elbow),
         tips_hand=tuple(1e3 * x for x in tips.in_hand),
         places_elbow=dict(zip(sensors.names, places.tolist(), strict=True)),
+        functional=functional,
+        definition=definition,
     )
 
 

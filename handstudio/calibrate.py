@@ -86,6 +86,7 @@ def calibrate(takes: Sequence[Take], progress: Progress = lambda _: None) -> Cal
         tips=hand.tips(),
         centres=hand.centres(),
         axes=hand.functional_axes(),
+        rocking=hand.rocks(),
         verdicts=tuple(verdicts.values()),
         takes=tuple((take.path.name, take.sha256()) for take in takes),
     )

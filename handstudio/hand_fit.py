@@ -21,6 +21,7 @@ from handstudio.hand.skeleton import (
     Skeleton,
     nominal_skeleton,
 )
+from handstudio.hand.skin import Skin, skin_of
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.setup import Setup
@@ -33,10 +34,12 @@ class HandFit:
     Attributes:
         skeleton: Joint centres, segment frames, fingertips.
         q_sensor_segment: Attitude of each sensor's segment in the sensor.
+        skin: How boards move on the bones; None: nothing is known of it.
     """
 
     skeleton: Skeleton
     q_sensor_segment: Float[Array, "s 4"]
+    skin: Skin | None = None
 
 
 def fit_of(setup: Setup) -> HandFit:
@@ -80,7 +83,22 @@ def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandF
         segment = known.get(place.segment)
         if segment is not None and segment.sensor == place.sensor:
             q_sensor_segment[sensor] = segment.q_sensor_segment
-    return HandFit(Skeleton(calibration.side, joint, rest, ends), q_sensor_segment)
+    skeleton = Skeleton(calibration.side, joint, rest, ends)
+    return HandFit(skeleton, q_sensor_segment, skin_of_calibration(calibration, layout))
+
+
+def skin_of_calibration(calibration: SubjectCalibration, layout: Layout) -> Skin:
+    """What a calibration tells of skin, as far as this layout's sensors are the ones it knows."""
+    names, drivers = layout.names, layout.drivers
+    on = {
+        s.sensor: s.name
+        for s in calibration.segments
+        if s.name in drivers and names[drivers[s.name]] == s.sensor
+    }
+    joints = {joint.name for joint in JOINTS if {joint.parent, joint.child} <= set(on.values())}
+    rocking = [(on[r.sensor], r.joint, r.share) for r in calibration.rocking if r.sensor in on]
+    swung = {axis.joint for axis in calibration.axes} & joints
+    return skin_of([rock for rock in rocking if rock[1] in joints], by_hand="wrist" in swung)
 
 
 def mechanism_of(setup: Setup) -> Mechanism:

@@ -17,7 +17,8 @@ from handstudio.hand.angles import (
 )
 from handstudio.hand.pose import Pose, posed
 from handstudio.hand.skeleton import PARENTS, SEGMENTS
-from handstudio.hand_fit import HandFit, fit_of
+from handstudio.hand.skin import taken_off
+from handstudio.hand_fit import HandFit, fit_of, skin_of_calibration
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
@@ -29,7 +30,7 @@ def segment_attitudes(
 ) -> Float[Array, "n k 4"]:
     """Attitude of every segment: by its own sensor, else carried along by its parent at rest.
 
-    ``fit`` is the setup's own unless given, here and below.
+    What is known of skin is taken off. ``fit`` is the setup's own unless given, here and below.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -41,6 +42,8 @@ def segment_attitudes(
     driven = [index for index, name in enumerate(SEGMENTS) if name in drivers]
     sensors = [drivers[SEGMENTS[index]] for index in driven]
     out[:, driven] = so3.multiply(q_world_sensor[:, sensors], q_sensor_segment[sensors])
+    if fit.skin is not None:
+        out = taken_off(fit.skin, skeleton, out)
     for index in sorted(set(range(len(SEGMENTS))) - set(driven)):
         out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
     return out
@@ -77,6 +80,8 @@ def angles_of(
     fit: HandFit | None = None,
 ) -> Float[Array, "n a"]:
     """Joint angles [rad], columns as `measured_angles`; root angles are NaN before the start.
+
+    The start is as the forearm's own sensor had it: a hand that lies flat then drags no skin.
 
     Raises:
         LayoutError: the layout is not a hand's.
@@ -117,7 +122,10 @@ def relative_rotations(
 
 
 def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
-    """Whether a segment's attitude is in doubt; one without a sensor is as its parent."""
+    """Whether a segment's attitude is in doubt; one without a sensor is as its parent.
+
+    Where the hand tells how the forearm is turned, doubt of the hand is the forearm's too.
+    """
     drivers = setup.layout.drivers
     out = np.zeros((len(doubt), len(SEGMENTS)), dtype=bool)
     for index, name in enumerate(SEGMENTS):
@@ -125,4 +133,6 @@ def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
             out[:, index] = doubt[:, drivers[name]] != 0
         elif PARENTS[index] >= 0:
             out[:, index] = out[:, PARENTS[index]]
+    if setup.subject is not None and skin_of_calibration(setup.subject, setup.layout).by_hand:
+        out[:, SEGMENTS.index("forearm")] |= out[:, SEGMENTS.index("hand")]
     return out

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from handstudio import pipeline
+from handstudio.calibration.subject import Axis, Rock, Segment, SubjectCalibration
 from handstudio.errors import LayoutError
 from handstudio.hand.angles import ROOT_ANGLES, hand_angles
-from handstudio.hand.skeleton import PARENTS, SEGMENTS
-from handstudio.hand_fit import fit_of
+from handstudio.hand.skeleton import PARENTS, SEGMENTS, nominal_skeleton
+from handstudio.hand_fit import fit_of, skin_of_calibration
 from handstudio.kinematics import (
     angles_of,
     doubtful_segments,
@@ -26,7 +27,7 @@ from handstudio.kinematics import (
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.maths import so3
 from handstudio.pipeline import Doubt, Motion, unsure
-from handstudio.setup import HandModel, Setup
+from handstudio.setup import HandModel, Setup, calibrated
 from handstudio.simulation.motions.showcase import showcase
 from handstudio.simulation.rig import Truth, signals
 from handstudio.simulation.subject import ideal_subject
@@ -195,3 +196,66 @@ def test_doubt_of_a_sensor_is_that_of_its_segment_and_of_those_it_carries():
         set(),
         {"index_proximal", "index_intermediate", "index_distal"},
     ]
+
+
+def known(layout: Layout) -> SubjectCalibration:
+    """The nominal hand, whose boards were seen to rock, and whose wrist was swung."""
+    skeleton = nominal_skeleton("right")
+    segments = tuple(
+        Segment(
+            name=name,
+            sensor=layout.names[sensor],
+            q_sensor_segment=(1.0, 0.0, 0.0, 0.0),
+            q_parent_rest=tuple(skeleton.q_parent_rest[SEGMENTS.index(name)].tolist()),
+            t_parent_joint=tuple(skeleton.t_parent_joint[SEGMENTS.index(name)].tolist()),
+            sd_m=(0.001,) * 3,
+            length_m=0.05,
+            length_sd_m=0.001,
+            source="measured",
+            length_source="measured",
+            plausible=0.0,
+        )
+        for name, sensor in layout.drivers.items()
+    )
+    return SubjectCalibration(
+        *("one", "2026-03-04T12:30:05+00:00", "handstudio", "S01", "right", 0.187, 3, "VG-1"),
+        segments,
+        (),
+        axes=(Axis("wrist", "SN11", (1.0, 0.0, 0.0), 0.01),),
+        rocking=(Rock("SN15", "index_mcp", 0.1), Rock("SN16", "index_pip", 0.1)),
+    )
+
+
+def test_a_board_that_rocks_by_a_tenth_of_its_joint_is_taken_back_by_it():
+    layout, bend = glove(), np.deg2rad(-60.0)
+    q = np.tile(so3.IDENTITY, (1, len(layout.sensors), 1))
+    for name in ("SN15", "SN16", "SN17"):
+        q[0, layout.names.index(name)] = so3.exp(np.array([1.1 * bend, 0.0, 0.0]))
+    setup = calibrated(setup_of(layout), subject=known(layout))
+    proximal, hand = (SEGMENTS.index(name) for name in ("index_proximal", "hand"))
+    before = segment_attitudes(setup_of(layout), q)
+    after = segment_attitudes(setup, q)
+    assert so3.log(before)[0, proximal, 0] == pytest.approx(1.1 * bend)
+    assert so3.log(after)[0, proximal, 0] == pytest.approx(bend, rel=0.02)
+    np.testing.assert_allclose(after[:, hand], before[:, hand], atol=1e-15)
+
+
+def test_of_skin_only_what_this_layouts_sensors_know_is_taken_off():
+    whole = skin_of_calibration(known(glove()), glove())
+    assert (len(whole.segment), whole.by_hand) == (2, True)
+    few = glove("right", ["SN1", "SN11", "SN15"])
+    skin = skin_of_calibration(known(glove()), few)
+    assert [SEGMENTS[k] for k in skin.segment] == ["index_proximal"]
+    other = glove("right", ["SN2", "SN11", "SN15"])  # another sensor has to tell the forearm
+    assert not skin_of_calibration(known(glove()), other).by_hand
+    assert fit_of(setup_of(glove())).skin is None
+
+
+def test_where_the_hand_turns_the_forearm_its_doubt_is_the_forearms():
+    layout = glove()
+    doubt = np.zeros((1, len(layout.sensors)), dtype=np.uint8)
+    doubt[0, layout.names.index("SN11")] = Doubt.SILENT
+    setup = calibrated(setup_of(layout), subject=known(layout))
+    for one, doubtful in ((setup_of(layout), {"hand"}), (setup, {"hand", "forearm"})):
+        found = doubtful_segments(one, doubt)[0]
+        assert {SEGMENTS[k] for k in np.flatnonzero(found)} == doubtful

@@ -66,6 +66,14 @@ class Chain:
         """From the centre of its segment's joint to a sensor, in its frame; and covariance."""
         return self._vector(("sensor", sensor, ""))
 
+    def lean(self, joint: str) -> Array | None:
+        """How the link to a joint leans in its parent's sensor as the joint before turns [m/rad].
+
+        None where it was not let to.
+        """
+        key: Key = ("lean", 0, joint)
+        return self._vector(key)[0] if key in self.index else None
+
     def _vector(self, key: Key) -> tuple[Array, Array]:
         part = slice(self.index[key], self.index[key] + 3)
         return self.x[part], self.covariance[part, part]

@@ -1,7 +1,8 @@
 """Segment frames from functional axes and links (5.1, 5.2), and the skeleton they make.
 
-x is the flexion axis of a segment's own joint, z stands on it and on the link to the segment's far
-end, y is the third. Zero is the flat hand: how a segment lies in its parent then.
+x is the flexion axis of a segment's own joint, z stands on it and on the bone, y is the third. The
+bone is the link to the segment's far end; in fingers it is what all their links and the flat hand
+tell together (`lying`). Zero is the flat hand: how a segment lies in its parent then.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from jaxtyping import Float
 from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis
 from handstudio.calibration.chain import Chain
+from handstudio.calibration.lying import bones
 from handstudio.calibration.swings import Swings
 from handstudio.hand.skeleton import DISTALS, FINGERS, JOINTS, PARENTS, SEGMENTS, Skeleton
 from handstudio.maths import so3
@@ -56,9 +58,11 @@ def framed(
     """
     drivers = tuple(swings.drivers(joint.name)[1] for joint in JOINTS)
     q_sensor_segment = np.tile(so3.IDENTITY, (len(JOINTS), 1))
+    lying = bones(swings, axes, chain)
     for k, sensor in enumerate(drivers):
         if sensor is not None:
-            far = _far_end(swings, chain, k, sensor)
+            bone = lying.get(SEGMENTS[k])
+            far = _far_end(swings, chain, k, sensor) if bone is None else bone
             q_sensor_segment[k] = _frame(swings, axes, k, sensor, far)
     rest = skeleton.q_parent_rest.copy()
     joint, covariance = skeleton.t_parent_joint.copy(), np.zeros((len(JOINTS), 3, 3))
@@ -70,6 +74,8 @@ def framed(
         link, spread = chain.link(JOINTS[k].name)
         turn = so3.to_matrix(q_segment_sensor)
         joint[k], covariance[k] = turn @ link, turn @ spread @ turn.T
+        if SEGMENTS[parent] in lying:  # the next joint is where its bone ends
+            joint[k] = joint[k][0], np.hypot(joint[k][1], joint[k][2]), 0.0
         if here is not None:
             base = so3.multiply(swings.q_flat(above), q_sensor_segment[parent])
             mine = so3.multiply(swings.q_flat(here), q_sensor_segment[k])

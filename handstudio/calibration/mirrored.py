@@ -3,7 +3,7 @@
 The mirror is the plane that divides the body: x becomes -x in every segment's and every sensor's
 frame, as ``hand.skeleton`` makes the left hand of the right one. A place (x, y, z) becomes
 (-x, y, z); a turn axis, which has a sense of rotation, (x, -y, -z); an attitude (w, x, y, z)
-becomes (w, x, -y, -z). Flexion stays flexion about +x.
+becomes (w, x, -y, -z). Flexion stays flexion about +x, and boards that rock with it rock alike.
 """
 
 from __future__ import annotations

@@ -56,11 +56,11 @@ def even(
     runs = [run for run in runs if len(run)]
     if not runs:
         raise CalibrationError("There are no samples in it.", "Record the calibration again.")
-    names = ImuSamples.__slots__
-    whole = ImuSamples(*(np.concatenate([getattr(run, n) for run in runs]) for n in names))
+    columns = ImuSamples.__slots__
+    whole = ImuSamples(*(np.concatenate([getattr(run, c) for run in runs]) for c in columns))
     time_s = (whole.time_us - whole.time_us[0]) * 1e-6
     keep = np.concatenate([[True], np.diff(time_s) > 0.0])
-    whole, time_s = ImuSamples(*(getattr(whole, n)[keep] for n in names)), time_s[keep]
+    whole, time_s = ImuSamples(*(getattr(whole, c)[keep] for c in columns)), time_s[keep]
     at = np.arange(round(time_s[-1] * rate_hz) + 1) / rate_hz
     after = np.clip(np.searchsorted(time_s, at), 1, len(time_s) - 1)
     nearest = np.where(at - time_s[after - 1] < time_s[after] - at, after - 1, after)

@@ -2,8 +2,10 @@
 
 A joint that bends pitches the boards on both its sides; the boards beyond stay as they are on
 their bones. So while one joint swings and its neighbours are still, the turn of a board against the
-one beyond it is its own rocking. Where no board lies beyond, or the joint between moves along by
-nature (a DIP with its PIP), it cannot be told, and none is assumed.
+one beyond it is its own rocking. Where the joint between moves along by nature (a DIP with its PIP)
+accelerations tell: seen from a board that rocks the link to the next joint leans as the joint
+bends, and the search for the centres finds by how much (`leaning`). Where no board lies beyond it
+cannot be told, and none is assumed.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis
+from handstudio.calibration.chain import Chain
 from handstudio.calibration.swings import Swings, relative_turn
 from handstudio.hand.skeleton import JOINTS, Joint
 from handstudio.maths import so3
@@ -42,6 +45,20 @@ def rocking(swings: Swings, axes: Mapping[str, JointAxis]) -> Rocking:
         slope = None if _follows(joint) else _slope(swings, axes[joint.name], above)
         if parent is not None and slope is not None:
             _note(found, parent, joint.name, slope)
+    return found
+
+
+def leaning(swings: Swings, axes: Mapping[str, JointAxis], chain: Chain) -> Rocking:
+    """How boards rock by how the links in them lean; of links that were let to."""
+    found: Rocking = {}
+    for joint in JOINTS:
+        above = next((j for j in JOINTS if j.child == joint.parent), None)
+        lean, driver = chain.lean(joint.name), swings.drivers(joint.name)[0]
+        if above is None or above.name not in axes or lean is None or driver is None:
+            continue
+        # a board that turns one way sees what lies fixed on the bone turn the other way
+        turned = np.cross(axes[above.name].seen_from(swings, driver), chain.link(joint.name)[0])
+        _note(found, driver, above.name, -float(lean @ turned / (turned @ turned)))
     return found
 
 

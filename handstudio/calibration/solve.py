@@ -12,11 +12,12 @@ from handstudio.calibration.axes import JointAxis, flexion_axis
 from handstudio.calibration.chain import Chain, solved
 from handstudio.calibration.chain_tree import USUAL, Priors
 from handstudio.calibration.frames import Frames, framed
-from handstudio.calibration.rocking import Rocking, rocking, steadied
+from handstudio.calibration.rocking import Rocking, leaning, rocking, steadied
 from handstudio.calibration.subject import (
     Axis,
     Centre,
     Quaternion,
+    Rock,
     Segment,
     Source,
     Tip,
@@ -45,7 +46,7 @@ class Found:
     """What signals say of a hand.
 
     Attributes:
-        swings: The course, sensors freed of rocking.
+        swings: The course, sensors freed of rocking as far as swings alone tell of it.
         axes: Flexion axes by joint.
         rocking: How boards rock.
         chain: Joint centres.
@@ -93,6 +94,11 @@ class Found:
             out.append(Axis(joint, name, _vector(axis.seen_from(self.swings, sensor)), axis.sd_rad))
         return tuple(out)
 
+    def rocks(self) -> tuple[Rock, ...]:
+        """How boards rock with the joints beside them, as far as it could be told."""
+        names = self.swings.layout.names
+        return tuple(Rock(names[s], joint, share) for (s, joint), share in self.rocking.items())
+
 
 def found(swings: Swings, side: HandSide, hand_length_m: float, priors: Priors = USUAL) -> Found:
     """Compute all that the swings of a course tell of a hand."""
@@ -102,6 +108,7 @@ def found(swings: Swings, side: HandSide, hand_length_m: float, priors: Priors =
     axes = _axes(steady)
     skeleton = nominal_skeleton(side, hand_length_m)
     chain = solved(steady, axes, skeleton, priors)
+    rocks = leaning(steady, axes, chain) | rocks
     return Found(steady, axes, rocks, chain, framed(steady, axes, chain, skeleton), skeleton)
 
 

@@ -64,6 +64,20 @@ class Axis(msgspec.Struct, frozen=True):
     sd_rad: float
 
 
+class Rock(msgspec.Struct, frozen=True):
+    """How the board of a sensor rocks on its skin with a joint beside it.
+
+    Attributes:
+        sensor: Which board.
+        joint: The joint of its segment, or one that its segment carries.
+        share: Turn of the board about the joint's axis per turn of the joint [rad/rad].
+    """
+
+    sensor: str
+    joint: str
+    share: float
+
+
 class Segment(msgspec.Struct, frozen=True):
     """A segment of the skeleton, and how its sensor sits on it.
 
@@ -120,6 +134,7 @@ class SubjectCalibration(msgspec.Struct, frozen=True):
         tips: All fingertips.
         centres: Joint centres seen from sensors.
         axes: Flexion axes seen from sensors.
+        rocking: How boards rock, as far as the course could tell.
         verdicts: Of every step of the course.
         takes: Name and SHA-256 of the takes it was computed from.
         mirrored_from: Id of the other hand's calibration this one mirrors; empty: measured.
@@ -138,6 +153,7 @@ class SubjectCalibration(msgspec.Struct, frozen=True):
     tips: tuple[Tip, ...]
     centres: tuple[Centre, ...] = ()
     axes: tuple[Axis, ...] = ()
+    rocking: tuple[Rock, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
     takes: tuple[tuple[str, str], ...] = ()
     mirrored_from: str = ""

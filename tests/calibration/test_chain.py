@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.attitude import attitude
 from handstudio.calibration.attitudes import attitudes_between_rests, unbiased
 from handstudio.calibration.axes import principal_axis
-from handstudio.calibration.rocking import rocking
+from handstudio.calibration.rocking import leaning, rocking
 from handstudio.calibration.solve import Found, found
 from handstudio.calibration.swings import Swings, prepared
 from handstudio.hand.skeleton import JOINTS, SEGMENTS
@@ -52,11 +52,18 @@ class Done:
 
 
 @cache
-def done(imperfections: str) -> Done:
-    """The course of one finger by a person whose joints are hinges."""
+def done(imperfections: str, intermediate: float | None = None) -> Done:
+    """The course of one finger by a person whose joints are hinges.
+
+    ``intermediate`` is how the board between PIP and DIP rocks with the PIP [rad/rad].
+    """
     someone = with_fixed_axes(subject(3))
     trajectory = perform(COURSE, Actor(someone, 5))
     worn = wear(someone, glove(), parse(imperfections), 5)
+    if intermediate is not None:
+        tilts = worn.skin.tilts.copy()
+        tilts[0, glove().names.index("SN16"), 0] = intermediate
+        worn = replace(worn, skin=replace(worn.skin, tilts=tilts))
     time_us = np.arange(round(trajectory.duration_s * RATE_HZ)) * (1_000_000 // RATE_HZ)
     sensed, _ = sense(worn, begin(worn), trajectory, time_us, RATE_HZ)
     truth = sensed.truth
@@ -151,7 +158,7 @@ def test_axes_of_perfect_sensors_are_the_frames_own() -> None:
 
 def test_frames_are_the_persons_own_where_they_were_swung() -> None:
     it = done("ideal")
-    for name in ("index_proximal", "index_intermediate"):
+    for name in ("index_proximal", "index_intermediate", "index_distal"):
         k = SEGMENTS.index(name)
         sensor = it.hand.frames.driver[k]
         assert sensor is not None
@@ -166,6 +173,20 @@ def test_a_board_that_rocks_is_noticed() -> None:
     true = it.worn.skin.tilts[0, proximal, 0]
     # flexion turns about minus x, and the axis found is the one of extension
     assert abs(found_rocking[proximal, "index_mcp"] - true) < 0.01
+    kept = {(rock.sensor, rock.joint): rock.share for rock in it.hand.rocks()}
+    assert abs(kept["SN15", "index_mcp"] - true) < 0.01
+
+
+def test_a_board_between_two_joints_that_bend_together_is_told_by_accelerations() -> None:
+    """Half of it at least: what nobody knew before pulls towards none."""
+    got = []
+    for true in (-0.06, 0.06):
+        it = done("rock=1", true)
+        kept = {(rock.sensor, rock.joint): rock.share for rock in it.hand.rocks()}
+        got.append(kept["SN16", "index_pip"])
+    assert 0.06 < got[1] - got[0] < 0.14
+    intermediate = it.swings.layout.names.index("SN16")
+    assert leaning(it.swings, it.hand.axes, it.hand.chain)[intermediate, "index_pip"] == got[1]
 
 
 def test_what_was_not_swung_rests_on_proportions_and_says_so() -> None:

@@ -10,6 +10,7 @@ from handstudio.calibration.mirrored import mirrored
 from handstudio.calibration.subject import (
     Axis,
     Centre,
+    Rock,
     Segment,
     SubjectCalibration,
     Tip,
@@ -19,8 +20,10 @@ from handstudio.calibration.subject import (
 from handstudio.hand.angles import hand_angles, joint_angles
 from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton, nominal_skeleton
 from handstudio.hand_fit import fit_of_calibration
+from handstudio.kinematics import segment_attitudes
 from handstudio.layout import glove
 from handstudio.maths import so3
+from handstudio.setup import Setup, calibrated
 
 NOW = "2026-03-04T12:30:05+00:00"
 
@@ -63,8 +66,10 @@ def calibration(side: str, seed: int | None = None) -> SubjectCalibration:
         ),
     )
     axes = (Axis("index_pip", "SN16", (0.8, 0.0, 0.6), 0.01),)
+    rocking = (Rock("SN15", "index_mcp", 0.05),)
     return SubjectCalibration(
-        *("one", NOW, "handstudio", "S01", side, 0.187, 3, "VG-1", segments, tips, centres, axes)
+        *("one", NOW, "handstudio", "S01", side, 0.187, 3, "VG-1", segments, tips, centres, axes),
+        rocking=rocking,
     )
 
 
@@ -119,6 +124,26 @@ def test_a_mirrored_movement_has_the_same_angles():
     np.testing.assert_allclose(
         angles(other, q_world_sensor * image), angles(one, q_world_sensor), atol=1e-9
     )
+
+
+def test_boards_rock_in_mirror_image():
+    """Skin that is taken off a mirrored movement leaves the mirrored movement."""
+    one = calibration("right", 5)
+    other = mirrored(one, "two", NOW)
+    image = np.array([1.0, 1.0, -1.0, -1.0])
+    q = so3.exp(0.4 * np.random.default_rng(2).standard_normal((20, 20, 3)))
+    right, left = (
+        segment_attitudes(calibrated(Setup(glove(each.side), 100.0), subject=each), seen)
+        for each, seen in ((one, q), (other, q * image))
+    )
+    np.testing.assert_allclose(right * image, left, atol=1e-12)
+
+
+def test_a_calibration_from_before_boards_were_known_to_rock_reads():
+    old = msgspec.structs.replace(calibration("right"), rocking=())
+    text = encode(old).replace(b'"rocking": [],', b"")
+    assert b"rocking" not in text
+    assert decode(text, "x") == old
 
 
 def test_places_and_axes_seen_from_a_sensor_are_mirrored():
