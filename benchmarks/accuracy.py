@@ -62,7 +62,9 @@ def main(
     motions: str = WORK,
     imperfections: str = "typical",
     soft_tissue: bool = True,
-    filter: str = "vqf",
+    filter: str = "tree",
+    smooth: bool = False,
+    compass: bool = True,
     calibration: Calibration = "truth",
     development: bool = False,
     budget: bool = True,
@@ -78,6 +80,8 @@ def main(
         imperfections: ideal, plain, typical, harsh, and changes to it.
         soft_tissue: Let sensors move on skin.
         filter: Which filter follows.
+        smooth: Let it look ahead, as `process --smooth` does.
+        compass: Read magnetometers; otherwise headings come from the opening turn alone.
         calibration: What the pipeline is told of hand and mounting: truth, or nothing but the
             hand's length (nominal), or what a course before found (own).
         development: People and seeds that parameters may be chosen on, not those reported.
@@ -88,7 +92,19 @@ def main(
     strengths = parse(imperfections if soft_tissue else f"{imperfections},-soft_tissue")
     people = (DEVELOPMENT if development else REPORTING)[:subjects]
     seeds = 0 if development else 10_000  # kept apart as the people are
-    trials = [Trial(n, motions, strengths, seeds + n, filter, calibration) for n in people]
+    trials = [
+        Trial(
+            n,
+            motions,
+            strengths,
+            seeds + n,
+            filter,
+            calibration,
+            smooth=smooth,
+            compass=compass,
+        )
+        for n in people
+    ]
     print(f"calibration: {calibration}; filter: {filter}; imperfections: {tell(strengths)}")
     found: dict[str, Any] = {
         "calibration": calibration,

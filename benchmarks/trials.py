@@ -6,7 +6,7 @@ The pipeline sees events only; the truth is looked at when it is done.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 import numpy as np
@@ -26,16 +26,17 @@ from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
 from handstudio.calibration.heading import CALIBRATED
 from handstudio.calibration.quick_start import quick_start
+from handstudio.calibration.solve import Found
+from handstudio.calibration.subject import Axis, Centre, Segment, SubjectCalibration, Tip
 from handstudio.hand.angles import hand_angles
-from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton
-from handstudio.hand.skin import skin_of
+from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS, HandSide
 from handstudio.hand_fit import HandFit, fit_of
 from handstudio.kinematics import angles_of, measured_angles, pose_of
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.recording.material import material
 from handstudio.samples import ImuSamples
-from handstudio.setup import HandModel, Setup, filter_named
+from handstudio.setup import HandModel, Setup, calibrated, filter_named, smoothing
 from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import Imperfections
 from handstudio.simulation.motions.actor import Actor
@@ -45,6 +46,7 @@ from handstudio.simulation.rig import Truth
 from handstudio.simulation.subject import Subject, subject
 from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.worn import Worn, begin, sense, wear
+from handstudio.smoothing import Smoother
 
 Calibration: TypeAlias = Literal["truth", "nominal", "own"]
 """What the pipeline is told of hand and mounting: all of it; nothing but the hand's length; or what
@@ -67,6 +69,8 @@ class Trial:
     filter: str = "vqf"
     calibration: Calibration = "truth"
     side: HandSide = "right"
+    smooth: bool = False  # with the future taken in
+    compass: bool = True  # otherwise no magnetometer is read
     x_along_bone: bool = False  # otherwise a sensor's x lies along the flexion axis
 
 
@@ -153,15 +157,30 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
     own, functional = None, None
     if trial.calibration == "own":
         setup, own, functional = _own(trial, setup, runs)
-    state = pipeline.begin(setup)
-    for samples in runs:
-        motion, state = pipeline.run(setup, state, [samples])
-        motions.append(motion)
+    if trial.calibration == "truth":
+        setup = calibrated(setup, subject=_as_it_is(worn))
+    if not trial.compass:
+        runs = [replace(samples, fresh=np.zeros_like(samples.fresh)) for samples in runs]
+    if trial.smooth:
+        motions = _smoothed(smoothing(setup), runs)
+    else:
+        state = pipeline.begin(setup)
+        for samples in runs:
+            motion, state = pipeline.run(setup, state, [samples])
+            motions.append(motion)
     truth = _joined(truths)
     time_s = truth.time_us * 1e-6
     compared = time_s >= _begins_s(performed)
     motion = pipeline.join(motions)
     return Followed(worn, setup, performed, truth, motion, compared, own, functional)
+
+
+def _smoothed(setup: Setup, runs: list[ImuSamples]) -> list[pipeline.Motion]:
+    smoother, state, motions = Smoother(setup), pipeline.begin(setup), []
+    for samples in runs:
+        motion, state = smoother.run(state, [samples])
+        motions.append(motion)
+    return [*motions, smoother.rest()]
 
 
 def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, HandFit, Array]:
@@ -172,27 +191,82 @@ def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, Han
     asked = Asked(trial.person, trial.seed, trial.imperfections)
     hand, known, course, labels = calibrated_hand(asked)
     functional = functional_frames(subject(trial.person), hand, course, labels)
-    frames = hand.frames
-    skeleton = Skeleton(
-        trial.side, frames.t_parent_joint, frames.q_parent_rest, frames.t_distal_tip
-    )
-    q_sensor_segment = np.tile(so3.IDENTITY, (len(setup.layout.sensors), 1))
-    for segment, sensor in enumerate(frames.driver):
-        if sensor is not None:
-            q_sensor_segment[sensor] = frames.q_sensor_segment[segment]
-    setup = msgspec.structs.replace(setup, sensors=known)
+    setup = calibrated(setup, subject=_kept(hand, trial), sensors=known)
     names = ImuSamples.__slots__
     opening = ImuSamples(*(np.concatenate([getattr(r, n) for r in runs[:2]]) for n in names))
     if known is not None:
         opening = corrected(opening, known, setup.layout.names)
-    alignment, _ = quick_start(opening, setup.layout.names, tolerances=CALIBRATED)
+    alignment, _ = quick_start(
+        opening, setup.layout.names, compass=trial.compass, tolerances=CALIBRATED
+    )
     setup = msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
-    rocking = [
-        (setup.layout.sensors[sensor].segment, joint, share)
-        for (sensor, joint), share in hand.rocking.items()
-    ]
-    skin = skin_of(rocking, by_hand="wrist" in hand.axes)
-    return setup, HandFit(skeleton, q_sensor_segment, skin), functional
+    return setup, fit_of(setup), functional
+
+
+def _kept(hand: Found, trial: Trial) -> SubjectCalibration:
+    """A calibration as the studio would keep it."""
+    return SubjectCalibration(
+        id="own",
+        made_utc="",
+        software="",
+        subject=str(trial.person),
+        side=trial.side,
+        hand_length_m=subject(trial.person).hand_length_m,
+        hand_type=3,
+        device="",
+        segments=hand.segments(),
+        tips=hand.tips(),
+        centres=hand.centres(),
+        axes=hand.functional_axes(),
+        rocking=hand.rocks(),
+    )
+
+
+def _as_it_is(worn: Worn) -> SubjectCalibration:
+    """A calibration that found everything: skeleton, mounting and places of the sensors."""
+    layout, skeleton = worn.layout, worn.subject.skeleton
+    q_sensor_segment = so3.conjugate(worn.mounting.q_segment_sensor)
+    segments, centres, axes = [], [], []
+    for k, name in enumerate(SEGMENTS):
+        sensor, joint = layout.drivers[name], JOINTS[k].name
+        place = so3.rotate(q_sensor_segment[sensor], worn.mounting.t_segment_sensor[sensor])
+        x = so3.rotate(q_sensor_segment[sensor], np.array([1.0, 0.0, 0.0]))
+        segments.append(
+            Segment(
+                name=name,
+                sensor=layout.names[sensor],
+                q_sensor_segment=_floats(q_sensor_segment[sensor]),
+                q_parent_rest=_floats(skeleton.q_parent_rest[k]),
+                t_parent_joint=_floats(skeleton.t_parent_joint[k]),
+                sd_m=(0.0, 0.0, 0.0),
+                length_m=float(skeleton.length_m[k]),
+                length_sd_m=0.0,
+                source="measured",
+                length_source="measured",
+                plausible=0.0,
+            )
+        )
+        nothing = (0.0, 0.0, 0.0)
+        known = layout.names[sensor]
+        centres.append(
+            Centre(joint, known, _floats(place), nothing, nothing, 0.0, (90.0, 0.0), 1.0)
+        )
+        axes.append(Axis(joint, known, _floats(x), _TRUE_AXIS_SD))
+    tips = tuple(
+        Tip(finger, _floats(tip), 0.0, "measured")
+        for finger, tip in zip(FINGERS, skeleton.t_distal_tip, strict=True)
+    )
+    return SubjectCalibration(
+        "truth", "", "", str(worn.subject.number), skeleton.side, worn.subject.hand_length_m, 3, "",
+        tuple(segments), tips, tuple(centres), tuple(axes),
+    )  # fmt: skip
+
+
+_TRUE_AXIS_SD = float(np.deg2rad(1.5))  # people's own axes are not exactly the simulator's x
+
+
+def _floats(values: Array) -> Any:
+    return tuple(float(value) for value in values)
 
 
 def performance(someone: Subject, motion: str, seed: int) -> Trajectory:

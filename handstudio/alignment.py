@@ -36,11 +36,12 @@ def aligned(
         CalibrationError: there is no quick start in it, or none that can be used.
     """
     names = setup.layout.names
+    samples = even(runs, setup.rate_hz, setup.sensors, names).samples
     found, _ = quick_start(
-        even(runs, setup.rate_hz, setup.sensors, names).samples,
+        samples,
         names,
         labels=labels,
-        compass=True,
+        compass=bool(samples.fresh.any()),  # without any the turn alone tells headings
         tolerances=tolerances_of(setup.sensors is not None),
     )
     return msgspec.structs.replace(setup, heading_rad=found.psi_cor), found
