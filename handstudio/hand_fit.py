@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -12,7 +13,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.mounting import nominal_mounting, nominal_places
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import LayoutError
-from handstudio.fusion.mechanism import FREE, Mechanism, bare
+from handstudio.fusion.mechanism import AS_SHIPPED, CALIBRATED, FREE, Mechanism, bare
 from handstudio.hand.skeleton import (
     FINGERS,
     JOINTS,
@@ -24,7 +25,7 @@ from handstudio.hand.skeleton import (
 from handstudio.hand.skin import Skin, skin_of
 from handstudio.layout import Layout
 from handstudio.maths import so3
-from handstudio.setup import Setup
+from handstudio.setup import JointGeometry, Setup
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,15 +125,53 @@ class _Same:
 @lru_cache(maxsize=16)
 def _mechanism(same: _Same) -> Mechanism:
     setup = same.setup
+    share = AS_SHIPPED if setup.sensors is None else CALIBRATED
+    return replace(_joined(setup), gyr_share=share, mean_rates=setup.mean_rates)
+
+
+def _joined(setup: Setup) -> Mechanism:
     heading = np.array(setup.heading_rad or (0.0,) * len(setup.layout.sensors))
     if not setup.layout.is_hand:
-        return replace(bare(len(heading)), heading_rad=heading)
+        return _of_joints(setup.layout, setup.joints, heading)
     calibration = setup.subject
     fit = fit_of(setup)
     places = nominal_places(setup.layout, fit.skeleton)
     if calibration is not None:
         places = _calibrated_places(calibration, setup.layout, fit, places)
     return hand_mechanism(setup.layout, fit, places, heading, calibration)
+
+
+def _of_joints(layout: Layout, joints: Sequence[JointGeometry], heading: Array) -> Mechanism:
+    """What joins sensors that are on no hand, as far as the setup tells."""
+    found = replace(bare(len(layout.sensors)), heading_rad=heading)
+    known = {joint.joint: joint for joint in joints}
+    for joint in layout.instrumented_joints:
+        if joint.name not in known:
+            continue
+        given = known[joint.name]
+        parent, child = layout.drivers[joint.parent], layout.drivers[joint.child]
+        found.parent[child] = parent
+        found.t_parent_joint[child] = given.t_parent_joint_m
+        found.t_sensor_joint[child] = given.t_child_joint_m
+        found.lever_sd_m[child] = given.sd_m
+        found.t_sensor_joint[parent] = 0.0
+        if given.parent_axis is not None and given.child_axis is not None:
+            found.axes[child] = joint.axes
+            found.axis_sd_rad[child] = given.axis_sd_rad
+            ends = [_X, _X if joint.axes == 1 else _Z]
+            found.q_parent_joint[child] = _taking(ends[0], np.array(given.parent_axis))
+            found.q_sensor_joint[child] = _taking(ends[1], np.array(given.child_axis))
+    return found
+
+
+_X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+def _taking(a: Array, b: Array) -> Array:
+    """A rotation that takes one unit vector to another."""
+    if a @ b < -1.0 + 1e-9:
+        return so3.exp(np.pi * np.array([0.0, 1.0, 0.0]))  # square to both x and z
+    return so3.normalize(np.concatenate([[1.0 + a @ b], np.cross(a, b)]))
 
 
 def hand_mechanism(

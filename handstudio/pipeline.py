@@ -18,9 +18,9 @@ from jaxtyping import Bool, Float, Float32, Int64, UInt8
 
 from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
-from handstudio.calibration.rest import REST_S, first_rest
+from handstudio.calibration.rest import REST_S, Rest, first_rest
 from handstudio.errors import SetupError
-from handstudio.fusion.filter import Fused, WholeFilter
+from handstudio.fusion.filter import ALIGNED_SD, COMPASS_SD, UNKNOWN_SD, Fused, WholeFilter
 from handstudio.hand_fit import mechanism_of
 from handstudio.maths import so3
 from handstudio.samples import Event, Gap, ImuSamples, Why
@@ -244,7 +244,7 @@ def _run_placing(
         state = _fuse(setup, state, samples[part], stretch[part], motions)
         for sensor, (at, rest) in rests.items():
             if at == end:
-                state = _place(setup, state, sensor, rest.q_world_sensor, rest.gyr_bias)
+                state = _place(setup, state, sensor, rest)
         done = here
     state = _fuse(setup, state, samples[done:], stretch[done:], motions)
     # nobody waits any more: nothing to keep, nothing to save with the state
@@ -252,15 +252,21 @@ def _run_placing(
     return replace(state, recent=recent[len(recent) - kept :])
 
 
-def _place(setup: Setup, state: State, sensor: int, attitude: Array, bias: Array) -> State:
-    placed = state.placed.copy()
+def _place(setup: Setup, state: State, sensor: int, rest: Rest) -> State:
+    placed, attitude = state.placed.copy(), rest.q_world_sensor
     placed[sensor] = True
-    if isinstance(setup.filter, WholeFilter) and setup.heading_rad:
-        attitude = so3.multiply(so3.about_z(np.array(setup.heading_rad[sensor])), attitude)
+    fused: Any
+    if not isinstance(setup.filter, WholeFilter):
+        fused = setup.filter.place(state.filter, sensor, attitude, rest.gyr_bias)
+    else:
+        heading_sd = COMPASS_SD if rest.compass else UNKNOWN_SD
+        if setup.heading_rad:
+            attitude = so3.multiply(so3.about_z(np.array(setup.heading_rad[sensor])), attitude)
+            heading_sd = ALIGNED_SD
+        fused = setup.filter.place(state.filter, sensor, attitude, rest.gyr_bias, heading_sd)
     start = state.q_world_start
     if sensor == setup.layout.drivers.get("forearm") and not np.isfinite(start).all():
         start = attitude
-    fused = setup.filter.place(state.filter, sensor, attitude, bias)
     return replace(state, filter=fused, placed=placed, q_world_start=start)
 
 

@@ -43,6 +43,28 @@ class Device(msgspec.Struct, frozen=True):
     protocol: int
 
 
+class JointGeometry(msgspec.Struct, frozen=True):
+    """Where a joint of a layout that is no hand lies, and how it turns, as its sensors see it.
+
+    Attributes:
+        joint: Its name in the layout.
+        t_parent_joint_m: Its centre from the parent's sensor, in that sensor's frame.
+        t_child_joint_m: Its centre from the child's sensor, in that one's.
+        sd_m: How well they are known.
+        parent_axis, child_axis: Unit vectors in the sensors: of a hinge its axis on both sides; of
+            a joint of two axes the first in the parent and the second in the child; None: unknown.
+        axis_sd_rad: How well they are known.
+    """
+
+    joint: str
+    t_parent_joint_m: tuple[float, float, float]
+    t_child_joint_m: tuple[float, float, float]
+    sd_m: float = 0.005
+    parent_axis: tuple[float, float, float] | None = None
+    child_axis: tuple[float, float, float] | None = None
+    axis_sd_rad: float = 0.05
+
+
 class HandModel(msgspec.Struct, frozen=True):
     """The hand that is shown: type 3 (two palm blocks) of mean proportions, by its length."""
 
@@ -68,6 +90,8 @@ class Setup(msgspec.Struct, frozen=True):
         heading_rad: By how much each sensor's orientation is turned about the vertical after
             fusion, in the order of the layout (4.22); empty: not at all.
         subject: The wearer's own hand, and how the glove sits on it; None: ``hand`` and the maker.
+        joints: Of a layout that is no hand: where its joints are, as far as that is known.
+        mean_rates: Rates are means since the sample before, not of the instant.
         smooth: Let a recorded take be fused with its future; nothing live does.
     """
 
@@ -84,6 +108,8 @@ class Setup(msgspec.Struct, frozen=True):
     sensors: DeviceCalibration | None = None
     heading_rad: tuple[float, ...] = ()
     subject: SubjectCalibration | None = None
+    joints: tuple[JointGeometry, ...] = ()
+    mean_rates: bool = False
     smooth: bool = False
 
     @property

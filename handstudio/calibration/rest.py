@@ -29,6 +29,7 @@ class Rest:
 
     q_world_sensor: Float[Array, " 4"]
     gyr_bias: Float[Array, " 3"]  # [rad/s]
+    compass: bool  # the heading is a compass's, else of no meaning
 
 
 def first_rest(recent: ImuSamples, sensor: int, window: int, start: int) -> tuple[int, Rest] | None:
@@ -83,4 +84,4 @@ def _rest(window: ImuSamples, sensor: int) -> Rest | None:
         return None
     mag = np.ascontiguousarray(window.mag[:, sensor][window.fresh[:, sensor]])
     field = mag.mean(axis=0) if len(mag) else None
-    return Rest(attitude(acc.mean(axis=0), field), bias)
+    return Rest(attitude(acc.mean(axis=0), field), bias, field is not None)

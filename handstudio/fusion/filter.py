@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
@@ -17,6 +18,15 @@ from handstudio.fusion.mechanism import Mechanism
 from handstudio.samples import ImuSamples
 
 State = TypeVar("State")
+
+ALIGNED_SD = float(np.deg2rad(0.5))
+"""Of headings that a turn of the whole rig has aligned [rad]."""
+
+COMPASS_SD = float(np.deg2rad(4.5))
+"""Of headings by compasses (the thesis, 4.2.5) [rad]."""
+
+UNKNOWN_SD = float(np.deg2rad(104.0))
+"""Of a heading that nothing tells [rad]: any direction is as likely."""
 
 
 @runtime_checkable
@@ -90,6 +100,17 @@ class WholeFilter(Filter[State], Protocol[State]):
     What others leave to a turn afterwards (4.22) must be right within it: its states and results
     are in the world that `Mechanism.heading_rad` turns all sensors into.
     """
+
+    def place(
+        self,
+        state: State,
+        sensor: int,
+        q_world_sensor: Float[Array, " 4"],
+        gyr_bias: Float[Array, " 3"],
+        heading_sd_rad: float = ALIGNED_SD,
+    ) -> State:
+        """As every filter; and how well its heading agrees with those of the others."""
+        ...
 
     def fused(
         self,

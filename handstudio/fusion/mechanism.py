@@ -18,7 +18,11 @@ from handstudio.maths import so3
 FREE = 3
 """Axes of a joint that nothing is known of but where its centre is."""
 
-_BARE_LEVER_SD_M = 1.0  # a lever nobody knows says nothing
+AS_SHIPPED, CALIBRATED = 0.015, 0.003
+"""Of a gyroscope's rate: scale and axes as shipped (data sheets: 1 to 3 %), and what calibration
+leaves, with timing."""
+
+_BARE_LEVER_SD_M = 0.0  # gravity is taken at the sensor itself
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,9 @@ class Mechanism:
         lever_sd_m: How well the centre is known.
         heading_rad: By how much a sensor's heading by compass is turned to agree with the others
             (4.21).
+        gyr_share: What gyroscopes err, as a share of the rate.
+        mean_rates: A rate is the mean since the sample before, as of sensors that sample faster
+            than they tell; else it is that of the instant.
     """
 
     parent: Int[Array, " s"]
@@ -52,6 +59,8 @@ class Mechanism:
     axis_sd_rad: Float[Array, " s"]
     lever_sd_m: Float[Array, " s"]
     heading_rad: Float[Array, " s"]
+    gyr_share: float = AS_SHIPPED
+    mean_rates: bool = False
 
     @property
     def sensors(self) -> int:

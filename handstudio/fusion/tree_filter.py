@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
-from handstudio.fusion.filter import Fused
+from handstudio.fusion.filter import ALIGNED_SD, Fused
 from handstudio.fusion.mechanism import Mechanism, bare
 from handstudio.fusion.tree_parts import FRESH, HEEDED, SATURATED, Beliefs, Joints, Memory
 from handstudio.maths import so3
@@ -30,7 +30,6 @@ from handstudio.samples import ImuSamples
 _PLACED_TILT = float(np.deg2rad(0.7))
 """Of an attitude found at rest [rad]: what 10 mg left in an accelerometer tilt it."""
 
-_PLACED_HEADING = float(np.deg2rad(0.5))
 _PLACED_BIAS = float(np.deg2rad(0.05))
 _UNPLACED_BIAS = float(np.deg2rad(1.0))
 
@@ -51,6 +50,7 @@ class TreeState:
         past: As the kernel keeps it.
         scalar: And this.
         turn: By how much the axes of the joint before a sensor are found to be off, in the sensor.
+        root: Slow means of the force at a root, in the world, its variance, and since when.
         slow: Variance of that; how far its compass is off, and variance; two of the kernel's.
     """
 
@@ -69,6 +69,7 @@ class TreeState:
     scalar: Float[Array, " 2"]
     turn: Float[Array, "s 3"]
     slow: Float[Array, "s 5"]
+    root: Float[Array, "s 8"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +108,7 @@ _SHAPES = {
     "bias_own": (3, 3),
     "past": (9,),
     "slow": (5,),
+    "root": (8,),
 }
 
 
@@ -125,12 +127,12 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
 
     Attributes:
         gyr_noise: White noise of a gyroscope [rad/sqrt(s)].
-        gyr_share: What else it errs, as a share of the rate: scale, axes, skin.
         acc_noise: Of an acceleration at a joint's centre, seen from both sides [m/s²].
         acc_share: And more, as a share of what it differs from gravity.
         joint_lasts_s: How long such errors last.
-        root_noise: How much the root is accelerated [m/s²].
-        root_share: And more, as a share of what it differs from gravity.
+        root_noise: By how much the root's mean force is not gravity [m/s²] ...
+        root_share: ... and more, as a share of how far single ones are from that mean ...
+        root_lasts_s: ... over so long.
         axis_noise: How far a joint does not keep its axes [rad] ...
         axis_lasts_s: ... and for how long.
         axis_walk: How its axes wander in the sensor [rad/sqrt(s)].
@@ -149,12 +151,12 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
     """
 
     gyr_noise: float = float(np.deg2rad(0.1))
-    gyr_share: float = 0.003
     acc_noise: float = 0.25
     acc_share: float = 0.1
     joint_lasts_s: float = 0.05
-    root_noise: float = 0.3
-    root_share: float = 0.5
+    root_noise: float = 0.05
+    root_share: float = 0.03
+    root_lasts_s: float = 1.0
     axis_lasts_s: float = 0.5
     mag_noise: float = float(np.deg2rad(3.0))
     mag_lasts_s: float = 0.5
@@ -167,7 +169,7 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
     gate: float = 3.0
     axis_noise: float = float(np.deg2rad(1.5))
     axis_walk: float = float(np.deg2rad(0.1))
-    mag_off: float = float(np.deg2rad(1.5))
+    mag_off: float = float(np.deg2rad(6.0))
     mag_walk: float = float(np.deg2rad(0.03))
     long_s: float = 20.0
 
@@ -193,6 +195,7 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
             np.zeros(2),
             zeros,
             np.tile([-1.0, 0.0, self.mag_off**2, 0.0, 0.0], (sensors, 1)),
+            np.zeros((sensors, 8)),
         )
 
     def restart(self, state: TreeState) -> TreeState:
@@ -211,16 +214,18 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
         sensor: int,
         q_world_sensor: Float[Array, " 4"],
         gyr_bias: Float[Array, " 3"],
+        heading_sd_rad: float = ALIGNED_SD,
     ) -> TreeState:
         """Set a sensor's attitude and bias, as found at rest; it then knows nothing of others."""
         new = {name: getattr(state, name).copy() for name in _ARRAYS}
         new["q"][sensor], new["bias"][sensor] = q_world_sensor, gyr_bias
-        sd = [_PLACED_TILT, _PLACED_TILT, _PLACED_HEADING]
+        sd = [_PLACED_TILT, _PLACED_TILT, heading_sd_rad]
         new["cov"][sensor] = np.diag(np.square(sd))
         new["edge"][sensor] = 0.0
         new["bias_cov"][sensor] = np.eye(3) * _PLACED_BIAS**2
         new["bias_own"][sensor] = 0.0
         new["past"][sensor, 8] = 1.0
+        new["root"][sensor] = 0.0
         return TreeState(state.period_s, **new)
 
     def turned(self, state: TreeState, turns: Float[Array, "s 4"]) -> TreeState:
@@ -232,6 +237,7 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
             q=so3.multiply(turns, state.q),
             cov=turn @ state.cov @ back,
             bias_own=state.bias_own @ back,
+            root=np.zeros_like(state.root),
             edge=np.zeros_like(state.edge),  # neighbours are where they were not
         )
 
@@ -356,4 +362,6 @@ def _as_arrays(mechanism: Mechanism) -> Joints:
         mechanism.axis_sd_rad,
         mechanism.lever_sd_m,
         mechanism.heading_rad,
+        mechanism.gyr_share,
+        mechanism.mean_rates,
     )

@@ -36,6 +36,8 @@ def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
     swept(m.order, m.parent, st.cov, st.edge, w.info, w.pull, w.cross, sweep, x)
     for s in range(n):
         turned_before(st.q[s], x[s, 0], x[s, 1], x[s, 2])
+        _turn_mean(st.root[s], x[s], 0)
+        _turn_mean(st.root[s], x[s], 3)
         times_by_rows(gain[s], st.cov[s], t)
         for i in range(3):
             for j in range(3):
@@ -50,6 +52,16 @@ def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
     for s in range(n):
         if int(st.past[s, 1]) & HEEDED:
             rested(beliefs, s, st, period)
+
+
+@njit
+@no_type_check
+def _turn_mean(mean, x, at):
+    """What was averaged was seen in the orientation that is corrected now."""
+    a, b, c = mean[at], mean[at + 1], mean[at + 2]
+    mean[at] += x[1] * c - x[2] * b
+    mean[at + 1] += x[2] * a - x[0] * c
+    mean[at + 2] += x[0] * b - x[1] * a
 
 
 @njit
@@ -116,6 +128,7 @@ def _compiled(stamp):
             np.zeros((n, 3)),
             np.zeros(3),
             np.zeros(3),
+            np.zeros(4),
         )
         sweep, x = np.zeros((5, n, 3, 3)), np.zeros((n, 3))
         begins, added = np.zeros(n, dtype=np.bool_), np.zeros(n)

@@ -8,7 +8,14 @@ import numpy as np
 from numba import njit
 
 from handstudio.fusion.tree_parts import FRESH, GRAVITY, HEEDED, SATURATED
-from handstudio.fusion.tree_small import at_joint, cross_to, matrix, rotated, square_to
+from handstudio.fusion.tree_small import (
+    at_joint,
+    cross_to,
+    matrix,
+    rotated,
+    square_to,
+    turned_after,
+)
 from handstudio.fusion.tree_sweep import spread_of
 
 
@@ -40,8 +47,8 @@ def observe(beliefs, m, st, dt, gyr, flags, w):
     before = st.scalar[0]
     period = before if before > 0.0 else dt
     for s in range(len(m.order)):
-        matrix(st.q[s], w.rot[s])
         _rates(st, s, gyr[s], flags[s], dt, before, w)
+        _seen_from(m, st, s, period, w)
         if int(st.past[s, 1]) & HEEDED:
             at_joint(st.acc1[s], w.here[s], w.there[s], m.tc[s], w.vx)
             rotated(w.rot[s], w.vx, w.force[s])
@@ -50,7 +57,7 @@ def observe(beliefs, m, st, dt, gyr, flags, w):
         usable = flag & HEEDED and not flag & SATURATED
         p = m.parent[s]
         if p < 0 and usable:
-            _gravity(beliefs, m, s, period, w)
+            _gravity(beliefs, m, st, s, period, w)
         if p >= 0:
             flag_p = int(st.past[p, 1])
             if usable and flag_p & HEEDED and not flag_p & SATURATED:
@@ -59,6 +66,19 @@ def observe(beliefs, m, st, dt, gyr, flags, w):
                 _axes(beliefs, m, st, s, period, w)
         if usable and flag & FRESH:
             _compass(beliefs, m, st, s, period, w)
+
+
+@njit
+@no_type_check
+def _seen_from(m, st, s, period, w):
+    """The attitude in which a reading was taken: means are of half a step before their instant."""
+    if not m.mean_rates:
+        matrix(st.q[s], w.rot[s])
+        return
+    w.quat[:] = st.q[s]
+    half = -0.5 * period
+    turned_after(w.quat, half * w.here[s, 0], half * w.here[s, 1], half * w.here[s, 2])
+    matrix(w.quat, w.rot[s])
 
 
 @njit
@@ -90,16 +110,28 @@ def _lever_doubt(m, s, at, w):
 
 @njit
 @no_type_check
-def _gravity(beliefs, m, s, period, w):
-    """What is felt at the root is gravity and how it is accelerated."""
-    f = w.force[s]
-    extra = abs(np.sqrt(f[0] ** 2 + f[1] ** 2 + f[2] ** 2) - GRAVITY)
-    variance = beliefs.root_noise**2 + (beliefs.root_share * extra) ** 2
-    variance += _lever_doubt(m, s, s, w)
-    weight = period / (variance * beliefs.joint_lasts_s)
-    w.vx[0], w.vx[1], w.vx[2] = f[0], f[1], f[2] - GRAVITY
-    square_to(f, weight, w.info[s])
-    cross_to(f, w.vx, -weight, w.pull[s])
+def _gravity(beliefs, m, st, s, period, w):
+    """What is felt at the root, in the long run, is gravity: nothing gathers speed for ever.
+
+    The force is averaged in the world, where gravity stays and accelerations come and go (as VQF
+    does); what is left of them is what speed is gained over the average's length.
+    """
+    f, slow = w.force[s], st.root[s]
+    slow[7] += period
+    share = min(1.0, period / min(slow[7], 0.5 * beliefs.root_lasts_s))
+    spread = 0.0
+    for i in range(3):
+        slow[i] += share * (f[i] - slow[i])
+        slow[3 + i] += share * (slow[i] - slow[3 + i])
+        spread += (f[i] - slow[3 + i]) ** 2
+    slow[6] += share * (spread - slow[6])
+    sd = beliefs.root_noise + beliefs.root_share * np.sqrt(slow[6])
+    variance = sd * sd + _lever_doubt(m, s, s, w)
+    weight = period / (variance * beliefs.root_lasts_s)
+    w.vy[0], w.vy[1], w.vy[2] = slow[3], slow[4], slow[5]
+    w.vx[0], w.vx[1], w.vx[2] = slow[3], slow[4], slow[5] - GRAVITY
+    square_to(w.vy, weight, w.info[s])
+    cross_to(w.vy, w.vx, -weight, w.pull[s])
 
 
 @njit
@@ -174,8 +206,9 @@ def _compass(beliefs, m, st, s, period, w):
         past[2], past[3] = size, dip
     odd = abs(size / past[2] - 1.0) / _ODD_SHARE + abs(dip - past[3]) / _ODD_DIP
     share = min(1.0, period / _USUAL_S)
-    past[2] += share * (size - past[2])
-    past[3] += share * (dip - past[3])
+    if odd < 1.0:
+        past[2] += share * (size - past[2])
+        past[3] += share * (dip - past[3])
     angle = np.arctan2(v[1], v[0]) - m.heading[s] - slow[1]
     angle -= 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
     short = beliefs.mag_noise**2 * (1.0 + odd**4) * beliefs.mag_lasts_s

@@ -27,6 +27,8 @@ class Joints(NamedTuple):
     axis_sd: Array
     lever_sd: Array
     heading: Array
+    gyr_share: float
+    mean_rates: bool
 
 
 class Memory(NamedTuple):
@@ -46,6 +48,7 @@ class Memory(NamedTuple):
     scalar: Array
     turn: Array
     slow: Array
+    root: Array
 
 
 class Work(NamedTuple):
@@ -60,18 +63,19 @@ class Work(NamedTuple):
     there: Array  # their derivatives
     vx: Array
     vy: Array
+    quat: Array
 
 
 class Beliefs(NamedTuple):
     """The numbers of `TreeFilter`, by their names there."""
 
     gyr_noise: float
-    gyr_share: float
     acc_noise: float
     acc_share: float
     joint_lasts_s: float
     root_noise: float
     root_share: float
+    root_lasts_s: float
     axis_lasts_s: float
     mag_noise: float
     mag_lasts_s: float

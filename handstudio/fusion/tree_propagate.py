@@ -53,6 +53,7 @@ def began(beliefs, m, s, st, acc, mag, flag):
     for c in range(len(m.order)):
         if m.parent[c] == s:
             st.edge[c] = 0.0
+    st.root[s] = 0.0
     st.past[s, 8] = 1.0
 
 
@@ -66,7 +67,7 @@ def propagate(beliefs, m, st, dt, gyr, flags, w, begins, added):
             w.there[s] = 0.0
             added[s] = 0.0
         elif flags[s] & HEEDED:
-            added[s] = _turned(beliefs, s, st, dt, gyr[s], flags[s], w)
+            added[s] = _turned(beliefs, m, s, st, dt, gyr[s], flags[s], w)
         else:  # carried along by its parent
             p = m.parent[s]
             for i in range(3):
@@ -78,17 +79,18 @@ def propagate(beliefs, m, st, dt, gyr, flags, w, begins, added):
 
 @njit
 @no_type_check
-def _turned(beliefs, s, st, dt, gyr, flag, w):
-    """Turn a sensor by the mean of two rates; the variance of that."""
+def _turned(beliefs, m, s, st, dt, gyr, flag, w):
+    """Turn a sensor by the mean rate of the step; the variance of that."""
     turn = w.here[s]
     fast = jump = 0.0
     follows = st.past[s, 0] >= 1.0
     for i in range(3):
-        mean = 0.5 * (gyr[i] + st.gyr1[s, i]) if follows else gyr[i]
+        between = follows and not m.mean_rates
+        mean = 0.5 * (gyr[i] + st.gyr1[s, i]) if between else gyr[i]
         jump = max(jump, abs(gyr[i] - st.gyr1[s, i]) if follows else 0.0)
         turn[i] = (mean - st.bias[s, i]) * dt
         fast += (mean - st.bias[s, i]) ** 2
-    share = beliefs.gyr_share**2 * _SHARE_LASTS_S * fast
+    share = m.gyr_share**2 * _SHARE_LASTS_S * fast
     variance = (beliefs.gyr_noise**2 + share) * dt
     if jump > beliefs.jump * dt:
         # no hand turns like that: go on as before, and believe neither much
