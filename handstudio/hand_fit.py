@@ -183,8 +183,9 @@ def hand_mechanism(
 ) -> Mechanism:
     """Joints of a hand as its sensors see them.
 
-    A second sensor on a segment hangs on the first by the segment's own joint: both feel the same
-    acceleration there. Without a calibration axes and places are those of mean proportions.
+    A second sensor on a segment stands for itself: skin moves it otherwise than the first, and
+    what both feel at their joint says too little. Without a calibration axes and places are those
+    of mean proportions.
     """
     found = replace(bare(len(layout.sensors)), heading_rad=heading_rad)
     drivers = layout.drivers
@@ -197,23 +198,18 @@ def hand_mechanism(
         found.t_sensor_joint[sensor] = so3.rotate(q_sensor_segment, -t_segment_sensor[sensor])
         found.lever_sd_m[sensor] = _LEVER_SD_M[calibration is not None]
         joint = joint_before.get(place.segment)
-        driver = drivers[place.segment]
-        if driver != sensor:
-            parent, axes, rest, centre = driver, FREE, so3.IDENTITY, np.zeros(3)
-        elif joint is not None and joint.parent in drivers:
-            parent = drivers[joint.parent]
-            axes = FREE if joint.name in _SADDLES else joint.axes
-            rest, centre = fit.skeleton.q_parent_rest[k], fit.skeleton.t_parent_joint[k]
-        else:
+        if drivers[place.segment] != sensor or joint is None or joint.parent not in drivers:
             continue
+        parent = drivers[joint.parent]
+        axes = FREE if joint.name in _SADDLES else joint.axes
+        rest, centre = fit.skeleton.q_parent_rest[k], fit.skeleton.t_parent_joint[k]
         q_parent_segment = fit.q_sensor_segment[parent]
         found.parent[sensor], found.axes[sensor] = parent, axes
         found.q_parent_joint[sensor] = so3.multiply(q_parent_segment, rest)
         found.t_parent_joint[sensor] = so3.rotate(
             q_parent_segment, centre - t_segment_sensor[parent]
         )
-        if joint is not None and driver == sensor:
-            found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
+        found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
     return found
 
 

@@ -16,7 +16,7 @@ from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.layout import glove
 from handstudio.protocol.packets import Description
 from handstudio.samples import STANDARD_GRAVITY
-from handstudio.setup import HandModel, Setup, filter_named, for_device
+from handstudio.setup import HandModel, JointGeometry, Setup, filter_named, for_device
 
 ABOUT = Description(
     protocol=1,
@@ -108,6 +108,9 @@ def test_the_key_tells_every_change_and_nothing_else():
         "sensors": DeviceCalibration("42", "2026-02-03T04:05:06Z", "handstudio", (), ()),
         "heading_rad": (0.1, 0.0, -0.1),
         "subject": HAND,
+        "joints": (JointGeometry("elbow", (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)),),
+        "mean_rates": True,
+        "smooth": True,
     }
     assert other.keys() == set(Setup.__struct_fields__)
     keys = {

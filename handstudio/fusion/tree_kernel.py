@@ -17,7 +17,7 @@ from handstudio.fusion import (
 )
 from handstudio.fusion.tree_learn import learn, rested
 from handstudio.fusion.tree_observe import observe
-from handstudio.fusion.tree_parts import HEEDED, Work
+from handstudio.fusion.tree_parts import HEEDED, ODD, Work
 from handstudio.fusion.tree_propagate import began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
 from handstudio.fusion.tree_sweep import spread_of, swept
@@ -68,6 +68,9 @@ def _turn_mean(mean, x, at):
 @no_type_check
 def _remember(st, gyr, acc, mag, flags):
     for s in range(len(flags)):
+        if st.past[s, 0] == ODD:
+            st.past[s, 0] = st.past[s, 1] = 0.0
+            continue
         if flags[s] & HEEDED:
             before = int(st.past[s, 1]) & HEEDED
             st.past[s, 0] = min(st.past[s, 0] + 1.0, 2.0) if before else 1.0

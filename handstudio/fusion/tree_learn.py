@@ -61,11 +61,13 @@ def rested(beliefs, s, st, period):
     past, bias, cov, own = st.past[s], st.bias[s], st.bias_cov[s], st.bias_own[s]
     share = min(1.0, period / _SMOOTH_S)
     rough = fast = 0.0
+    # what turns as slowly as biases are known is at rest; a slow hand is not
+    known = _SURE * np.sqrt((cov[0, 0] + cov[1, 1] + cov[2, 2]) / 3.0) + _LEAST_RATE
     for i in range(3):
         rough = max(rough, abs(st.gyr1[s, i] - past[5 + i]))
         past[5 + i] += share * (st.gyr1[s, i] - past[5 + i])
         fast = max(fast, abs(past[5 + i] - bias[i]))
-    if max(rough, fast) > beliefs.rest_rate:
+    if rough > beliefs.rest_rate or fast > min(known, beliefs.rest_rate):
         past[4] = 0.0
         return
     past[4] += period
@@ -84,4 +86,6 @@ def rested(beliefs, s, st, period):
                 own[u, v] -= b[u] * x[v] / total
 
 
+_SURE = 3.0
+_LEAST_RATE = float(np.deg2rad(0.1))
 _SMOOTH_S = 0.5  # over which a rate at rest is averaged

@@ -9,6 +9,9 @@ from handstudio.arrays import Array
 HEEDED, FRESH, SATURATED = 1, 2, 4
 """Bits of a sample's flags."""
 
+ODD = -1.0
+"""In place of a count of instants: the newest reading was no hand's, and is forgotten."""
+
 GRAVITY = 9.80665
 TINY = 1e-18
 

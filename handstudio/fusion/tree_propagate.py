@@ -7,7 +7,7 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
-from handstudio.fusion.tree_parts import FRESH, HEEDED, SATURATED, TINY
+from handstudio.fusion.tree_parts import FRESH, HEEDED, ODD, SATURATED, TINY
 from handstudio.fusion.tree_small import (
     inverse3,
     matrix,
@@ -97,6 +97,7 @@ def _turned(beliefs, m, s, st, dt, gyr, flag, w):
         for i in range(3):
             turn[i] = (st.gyr1[s, i] - st.bias[s, i]) * dt
         variance += min(jump * dt, _MOST_JUMP) ** 2
+        st.past[s, 0] = ODD
     if (flag | int(st.past[s, 1])) & SATURATED:
         variance += (_SATURATED_RATE * dt) ** 2
     rotated(w.rot[s], turn, w.there[s])
