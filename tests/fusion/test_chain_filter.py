@@ -186,6 +186,28 @@ def test_headings_that_compasses_scatter_by_are_handed_out_as_compasses_have_the
     assert np.rad2deg(so3.angle_between(back, agreed).max()) < 0.01
 
 
+def test_the_level_field_is_the_mean_of_half_a_second_after_placing_and_then_left():
+    samples, truth, mechanism = worn(FINGER)
+    fusion = Filter4()
+    stronger = samples.mag * np.where(np.arange(len(samples)) < 50, 1.0, 2.0)[:, None, None]
+    state = placed(fusion, truth.q_world_sensor[0])
+    _, after = fused(fusion, state, replace(samples, mag=stronger)[:120], mechanism)
+    field = so3.rotate(truth.q_world_sensor[:50], samples.mag[:50])
+    expected = np.hypot(field[..., 0], field[..., 1]).mean(axis=0)
+    np.testing.assert_allclose(after.level_ut[0], expected, rtol=0.01)
+    assert not fusion.place(after, 2, truth.q_world_sensor[0, 2], np.zeros(3)).levels[0, 2]
+
+
+def test_without_fresh_readings_a_common_heading_is_not_observed():
+    """Gravity tells only how the sensors' headings differ."""
+    samples, truth, mechanism = worn(FINGER)
+    silent = replace(samples, fresh=np.zeros_like(samples.fresh))[:200]
+    turned = so3.multiply(so3.about_z(np.array(0.5)), truth.q_world_sensor[0])
+    out, _ = fused(Filter4(), placed(Filter4(), turned), silent, mechanism)
+    off = so3.multiply(so3.about_z(np.array(0.5)), truth.q_world_sensor[:200])
+    assert np.rad2deg(so3.angle_between(out, off).max()) < 1.0
+
+
 # --- chains that share sensors ------------------------------------------------------------------
 
 
