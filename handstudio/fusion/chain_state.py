@@ -109,6 +109,7 @@ def averaged(angles: Float[Array, "n c l 3"], chains: Chains) -> Float[Array, "n
     """One orientation a sensor: circular means, angle by angle, over the chains that share it.
 
     The mean of copies is that of their differences to the first, each the shorter way round.
+    As published: near theta = +-90 deg phi and psi of one attitude are anything, and so is a mean.
     """
     copies = copies_of(chains)
     means = np.empty((len(angles), len(copies), 3))
