@@ -220,7 +220,7 @@ def _budget(like: Trial, people: Sequence[int]) -> dict[str, Any]:
 
 
 def _thesis(people: Sequence[int], strengths: Imperfections) -> dict[str, Any]:
-    asked = thesis.takes(people, strengths, ("raw", "filter1", "vqf"))
+    asked = thesis.takes(people, strengths)
     figures = _tried("the thesis's experiment", thesis.run, asked)
     found: dict[str, Any] = {}
     for setting, published in thesis.PUBLISHED.items():
@@ -234,7 +234,7 @@ def _thesis(people: Sequence[int], strengths: Imperfections) -> dict[str, Any]:
                 ],
                 axis=0,
             ).tolist()
-            for name in ("raw", "filter1", "vqf")
+            for name in thesis.FILTERS
             for along in (False, True)
         }
         found[setting] = {

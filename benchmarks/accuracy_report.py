@@ -138,14 +138,14 @@ def _bars(axes: Any, values: dict[str, float], title: str) -> None:
 
 def _draw_thesis(axes: Any, experiment: dict[str, Any]) -> None:
     settings = experiment["settings"]
-    width, at = 0.095, np.arange(len(settings))
+    width, at = 0.08, np.arange(len(settings))
     published, *ours = next(iter(settings.values()))
-    kinds = [(w, n) for n in ("raw", "filter1") for w in (published, *ours)]
-    kinds += [(published, "filter4"), *((w, "vqf") for w in ours)]
+    kinds = [(w, n) for n in ("raw", "filter1", "filter4") for w in (published, *ours)]
+    kinds += [(w, "vqf") for w in ours]
     for k, (where, name) in enumerate(kinds):
         heights = [float(np.mean(one[where][name])) for one in settings.values()]
         hatch = "//" if where == published else ""
-        axes.bar(at + width * (k - 4), heights, width, label=f"{name}, {where}", hatch=hatch)
+        axes.bar(at + width * (k - 5), heights, width, label=f"{name}, {where}", hatch=hatch)
     axes.set_xticks(at, list(settings))
     axes.set(title="The thesis's experiment: mean of five sensors", ylabel="RMSE norm [deg]")
     axes.set_ylim(top=1.45 * axes.get_ylim()[1])  # room for the legend

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 import tyro
 
@@ -96,7 +97,10 @@ def _tree_us(samples: ImuSamples, setup: Setup | None) -> float:
 def _chains(sensors: int) -> Any:
     parent = np.array([-1 if s % 5 == 0 else s - 1 for s in range(sensors)])
     return replace(
-        bare(sensors), parent=parent, axes=np.ones(sensors, dtype=np.int64), lever_sd_m=_OFF * np.ones(sensors)
+        bare(sensors),
+        parent=parent,
+        axes=np.ones(sensors, dtype=np.int64),
+        lever_sd_m=_OFF * np.ones(sensors),
     )
 
 
@@ -145,8 +149,6 @@ def _offline() -> dict[str, float]:
 
 def replace_filter(setup: Setup, name: str) -> Setup:
     """The setup with another filter."""
-    import msgspec  # noqa: PLC0415
-
     return msgspec.structs.replace(setup, filter=filter_named(name))
 
 

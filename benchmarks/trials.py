@@ -5,6 +5,7 @@ The pipeline sees events only; the truth is looked at when it is done.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
@@ -24,7 +25,7 @@ from handstudio.analysis.hand_error import (
 )
 from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
-from handstudio.calibration.heading import CALIBRATED
+from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED, Tolerances
 from handstudio.calibration.quick_start import quick_start
 from handstudio.calibration.solve import Found
 from handstudio.calibration.subject import Axis, Centre, Segment, SubjectCalibration, Tip
@@ -72,6 +73,7 @@ class Trial:
     smooth: bool = False  # with the future taken in
     compass: bool = True  # otherwise no magnetometer is read
     x_along_bone: bool = False  # otherwise a sensor's x lies along the flexion axis
+    align: bool = False  # headings by the quick start of the take, also where nothing else is "own"
 
 
 class Figures(msgspec.Struct, frozen=True):
@@ -159,6 +161,9 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
         setup, own, functional = _own(trial, setup, runs)
     if trial.calibration == "truth":
         setup = calibrated(setup, subject=_as_it_is(worn))
+    if trial.align and trial.calibration != "own":
+        labels = [(span.start_s, span.end_s, span.name) for span in performed.spans]
+        setup = _aligned(setup, trial, runs, labels=labels)
     if not trial.compass:
         runs = [replace(samples, fresh=np.zeros_like(samples.fresh)) for samples in runs]
     if trial.smooth:
@@ -192,15 +197,30 @@ def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, Han
     hand, known, course, labels = calibrated_hand(asked)
     functional = functional_frames(subject(trial.person), hand, course, labels)
     setup = calibrated(setup, subject=_kept(hand, trial), sensors=known)
+    setup = _aligned(setup, trial, runs, CALIBRATED)
+    return setup, fit_of(setup), functional
+
+
+def _aligned(
+    setup: Setup,
+    trial: Trial,
+    runs: list[ImuSamples],
+    tolerances: Tolerances = UNCALIBRATED,
+    labels: Sequence[tuple[float, float, str]] = (),
+) -> Setup:
+    """Headings by the turn that a recording opens with."""
     names = ImuSamples.__slots__
     opening = ImuSamples(*(np.concatenate([getattr(r, n) for r in runs[:2]]) for n in names))
-    if known is not None:
-        opening = corrected(opening, known, setup.layout.names)
+    if setup.sensors is not None:
+        opening = corrected(opening, setup.sensors, setup.layout.names)
     alignment, _ = quick_start(
-        opening, setup.layout.names, compass=trial.compass, tolerances=CALIBRATED
+        opening,
+        setup.layout.names,
+        labels=labels,
+        compass=trial.compass,
+        tolerances=tolerances,
     )
-    setup = msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
-    return setup, fit_of(setup), functional
+    return msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
 
 
 def _kept(hand: Found, trial: Trial) -> SubjectCalibration:

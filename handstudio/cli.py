@@ -184,7 +184,8 @@ def process(
 
     Args:
         takes: The takes.
-        filter: Another filter than the take was recorded with (tree, vqf, raw, filter1).
+        filter: Another filter than the take was recorded with (tree, vqf, raw, filter1 to
+            filter4).
         smooth: Take in what came after every instant as well: the tree filter's smoother.
         from_start: Ignore what the studio knew before the first byte of the take.
         calibration: File of another subject calibration than the take carries, or none.

@@ -197,6 +197,7 @@ def hand_mechanism(
         found.q_sensor_joint[sensor] = q_sensor_segment
         found.t_sensor_joint[sensor] = so3.rotate(q_sensor_segment, -t_segment_sensor[sensor])
         found.lever_sd_m[sensor] = _LEVER_SD_M[calibration is not None]
+        found.chain_root[sensor] = _chain_root(layout, place.segment)
         joint = joint_before.get(place.segment)
         if drivers[place.segment] != sensor or joint is None or joint.parent not in drivers:
             continue
@@ -211,6 +212,17 @@ def hand_mechanism(
         )
         found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
     return found
+
+
+_FIRST_IN_CHAIN = {"thumb": "SN3", "index": "SN1", "middle": "SN1", "ring": "SN2", "little": "SN2"}
+"""Which of the forearm's sensors each finger's chain begins with (the thesis's table 3.6)."""
+
+
+def _chain_root(layout: Layout, segment: str) -> int:
+    """Where that sensor is worn; -1: it is not, or the segment is no finger's."""
+    name = _FIRST_IN_CHAIN.get(segment.partition("_")[0], "")
+    worn = [k for k, p in enumerate(layout.sensors) if (p.sensor, p.segment) == (name, "forearm")]
+    return worn[0] if worn else -1
 
 
 _SADDLES = ("thumb_cmc",)

@@ -10,6 +10,7 @@ import msgspec
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import CalibrationError, SetupError
+from handstudio.fusion.chain_filter import Filter2, Filter3, Filter4
 from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
 from handstudio.fusion.tree_filter import TreeFilter
@@ -19,7 +20,7 @@ from handstudio.layout import Layout, glove
 from handstudio.protocol.packets import Description, sensor_name
 from handstudio.samples import Ranges
 
-AnyFilter: TypeAlias = TreeFilter | VqfFilter | RawFilter | Filter1
+AnyFilter: TypeAlias = TreeFilter | VqfFilter | RawFilter | Filter1 | Filter2 | Filter3 | Filter4
 """The filters a setup can name; each is a struct with a tag of its own."""
 
 FILTERS: dict[str, AnyFilter] = {
@@ -27,6 +28,9 @@ FILTERS: dict[str, AnyFilter] = {
     "vqf": VqfFilter(),
     "raw": RawFilter(),
     "filter1": Filter1(),
+    "filter2": Filter2(),
+    "filter3": Filter3(),
+    "filter4": Filter4(),
 }
 
 

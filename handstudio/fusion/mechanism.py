@@ -45,6 +45,8 @@ class Mechanism:
         lever_sd_m: How well the centre is known.
         heading_rad: By how much a sensor's heading by compass is turned to agree with the others
             (4.21).
+        chain_root: Which sensor of the root's segment stands first in the chain to a sensor, for
+            filters over chains; -1: the one that `parent` leads to.
         gyr_share: What gyroscopes err, as a share of the rate.
         mean_rates: A rate is the mean since the sample before, as of sensors that sample faster
             than they tell; else it is that of the instant.
@@ -59,6 +61,7 @@ class Mechanism:
     axis_sd_rad: Float[Array, " s"]
     lever_sd_m: Float[Array, " s"]
     heading_rad: Float[Array, " s"]
+    chain_root: Int[Array, " s"]
     gyr_share: float = AS_SHIPPED
     mean_rates: bool = False
 
@@ -91,4 +94,5 @@ def bare(sensors: int) -> Mechanism:
         axis_sd_rad=np.full(sensors, np.pi),
         lever_sd_m=np.full(sensors, _BARE_LEVER_SD_M),
         heading_rad=np.zeros(sensors),
+        chain_root=np.full(sensors, -1),
     )

@@ -23,7 +23,7 @@ from handstudio.arrays import Array
 from handstudio.errors import SetupError
 from handstudio.fusion.filter import ALIGNED_SD, Fused
 from handstudio.fusion.mechanism import Mechanism, bare
-from handstudio.fusion.tree_parts import FRESH, HEEDED, SATURATED, Beliefs, Joints, Memory
+from handstudio.fusion.tree_parts import FRESH, HEEDED, PLACED, SATURATED, Beliefs, Joints, Memory
 from handstudio.maths import so3
 from handstudio.samples import ImuSamples
 
@@ -224,7 +224,7 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
         new["edge"][sensor] = 0.0
         new["bias_cov"][sensor] = np.eye(3) * _PLACED_BIAS**2
         new["bias_own"][sensor] = 0.0
-        new["past"][sensor, 8] = 1.0
+        new["past"][sensor, 8] = PLACED
         new["root"][sensor] = 0.0
         return TreeState(state.period_s, **new)
 

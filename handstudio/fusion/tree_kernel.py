@@ -17,8 +17,8 @@ from handstudio.fusion import (
 )
 from handstudio.fusion.tree_learn import learn, rested
 from handstudio.fusion.tree_observe import observe
-from handstudio.fusion.tree_parts import HEEDED, ODD, Work
-from handstudio.fusion.tree_propagate import began, propagate
+from handstudio.fusion.tree_parts import HEEDED, ODD, PLACED, Work
+from handstudio.fusion.tree_propagate import apart, began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
 from handstudio.fusion.tree_sweep import spread_of, swept
 
@@ -135,6 +135,10 @@ def _compiled(stamp):
         )
         sweep, x = np.zeros((5, n, 3, 3)), np.zeros((n, 3))
         begins, added = np.zeros(n, dtype=np.bool_), np.zeros(n)
+        for s in range(n):
+            if st.past[s, 8] == PLACED:
+                apart(m, st, s)
+                st.past[s, 8] = 1.0
         for k in range(len(gyr)):
             if st.scalar[1] > 0.0:
                 _correct(beliefs, m, st, gyr[k], flags[k], dt[k], w, sweep, x)

@@ -9,6 +9,9 @@ from handstudio.arrays import Array
 HEEDED, FRESH, SATURATED = 1, 2, 4
 """Bits of a sample's flags."""
 
+PLACED = 2.0
+"""In place of 1 for a sensor that has begun: it was placed, and those beyond do not know yet."""
+
 ODD = -1.0
 """In place of a count of instants: the newest reading was no hand's, and is forgotten."""
 

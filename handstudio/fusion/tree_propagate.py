@@ -49,12 +49,19 @@ def began(beliefs, m, s, st, acc, mag, flag):
     st.cov[s, 0, 0] = st.cov[s, 1, 1] = beliefs.unknown_tilt**2
     st.cov[s, 2, 2] = beliefs.unknown_heading**2 * (1.0 if known else 25.0)
     st.bias_own[s] = 0.0
+    apart(m, st, s)
+    st.root[s] = 0.0
+    st.past[s, 8] = 1.0
+
+
+@njit
+@no_type_check
+def apart(m, st, s):
+    """A sensor whose orientation was set anew errs with none of its neighbours."""
     st.edge[s] = 0.0
     for c in range(len(m.order)):
         if m.parent[c] == s:
             st.edge[c] = 0.0
-    st.root[s] = 0.0
-    st.past[s, 8] = 1.0
 
 
 @njit

@@ -67,6 +67,9 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                     + follow[c, i, 2] * edge[c, j, 2]
                 )
                 t[i, j] = t[j, i] = v
+        if not _is_positive(t):  # rounding, or a model that is wrong: better to know less
+            edge[c], follow[c] = 0.0, 0.0
+            t[:] = cov[c]
         inverse3(t, sure[c])
         # message to the parent
         for i in range(3):
@@ -127,3 +130,13 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                     + edge[c, i, 2] * gain[c, j, 2]
                 )
                 cov[c, i, j] = cov[c, j, i] = v
+
+
+@njit
+@no_type_check
+def _is_positive(a):
+    """Whether a symmetric 3 x 3 is a covariance."""
+    two = a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]
+    c02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
+    c12 = a[0, 1] * a[0, 2] - a[0, 0] * a[1, 2]
+    return a[0, 0] > 0.0 and two > 0.0 and a[0, 2] * c02 + a[1, 2] * c12 + a[2, 2] * two > 0.0
