@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handstudio.calibration.rest import REST_S, Rest, first_rest
@@ -89,6 +89,7 @@ def restless(n: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-40.0, 40.0, size=(n, 3))
 
 
+@settings(max_examples=30)
 @given(st.lists(st.integers(0, 260), max_size=12).map(sorted), st.integers(0, 2))
 def test_rest_is_found_at_the_same_instant_however_the_samples_are_cut(cuts, seed):
     moving = np.concatenate([restless(100, seed), np.zeros((160, 3))])

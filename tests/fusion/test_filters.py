@@ -98,6 +98,7 @@ def test_it_is_a_filter_and_a_value(name):
 
 
 @pytest.mark.parametrize("name", sorted(set(FILTERS) - SLOW))
+@settings(max_examples=25)
 @given(cuts=CUTS)
 def test_cutting_the_samples_or_putting_the_state_away_changes_no_digit(
     name, cuts, samples, stretch, heeded
