@@ -36,6 +36,13 @@ class BlinkSensor:
 
 
 @dataclass(frozen=True, slots=True)
+class SetFilter:
+    """Fuse by the filter of this name from now on; empty: by the one that suits the device."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class Perform:
     """Let the wearer of the virtual glove do this."""
 
@@ -382,6 +389,7 @@ Intent: TypeAlias = (
     | ConnectDevice
     | DisconnectDevice
     | BlinkSensor
+    | SetFilter
     | Perform
     | ChooseSubject
     | SaveSubject

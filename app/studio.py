@@ -17,6 +17,7 @@ from app import diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
+from app.filtering import Chooser, Prepared
 from app.holding import Holder
 from app.jobs import Jobs, Stopped
 from app.keeping import Keeper
@@ -76,6 +77,7 @@ class Studio:
         self._taker = Taker(self.capture, self.state.sessions)
         self._calibrator = Calibrator(self.capture, self._taker, self.state.sessions)
         self._holder = Holder(self.capture, self.state.sessions)
+        self._chooser = Chooser(self.capture)
         self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
@@ -91,6 +93,10 @@ class Studio:
         """Ask for something; returns at once. For any thread."""
         self._inbox.put(intent)
 
+    def prepare(self, preparation: Prepared) -> None:
+        """Use the whole-hand filter for hands once this has got it ready."""
+        self._chooser.preparation = preparation
+
     def tick(self, elapsed_s: float) -> State:
         """Take in all that happened; the state afterwards."""
         told = replace(self.state, messages=(), downloads=(), sounds=())
@@ -105,6 +111,7 @@ class Studio:
         self._finish_work()
         self._take_on(elapsed_s)
         self._guide_on(elapsed_s)
+        self.state = replace(self.state, preparing=self._chooser.follow(self.state))
         idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
         self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
         self.state = replace(self.state, searching=self._looker.busy)
@@ -266,6 +273,8 @@ class Studio:
                 change(countdown_s=seconds)
             case intents.SetSounds(on=on):
                 change(sounds=on)
+            case intents.SetFilter(name=name):
+                change(filter=name)
             case intents.SetTheme(dark=dark):
                 change(theme="dark" if dark else "light")
             case intents.SetLanguage(language=language):
