@@ -330,6 +330,20 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
+class Smooth:
+    """Show the open take with its future taken in, or as it was live."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """Show the open take a second time, by another filter or smoothed; empty: no more."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class FaceForward:
     """Turn the picture so that the forearm points away from the viewer."""
 
@@ -432,6 +446,8 @@ Intent: TypeAlias = (
     | WholeTake
     | SetLoop
     | Export
+    | Smooth
+    | Compare
     | FaceForward
     | BeginCourse
     | Guide

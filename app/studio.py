@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from app import diagnostics, intents, shaken, words
+from app import comparison, diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
@@ -29,7 +29,7 @@ from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Solved, Workshop
+from app.workshop import Computed, Exported, Gathered, Solved, Uncomputed, Workshop
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
@@ -47,6 +47,7 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Window
+from handstudio.pipeline import Motion
 from handstudio.process import kept_motion
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
@@ -145,7 +146,7 @@ class Studio:
             self._say(error)
         self._take_shelf()
 
-    def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+    def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912, PLR0915 - a list
         """Devices, recording, opening; False: it is about something else."""
         match intent:
             case intents.FindDevices():
@@ -178,6 +179,10 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.Smooth(on=on):
+                self._ask_of_review(smooth=on)
+            case intents.Compare(name=name):
+                self._ask_of_review(compare=name)
             case intents.CancelWork():
                 self._workshop.cancel()
             case intents.SendDiagnostics(page=page):
@@ -493,6 +498,33 @@ class Studio:
             return
         self._workshop.compute(take)
 
+    def _ask_of_review(self, **asked: Any) -> None:
+        if self.state.review is not None:
+            self._bring(replace(self.state.review, **asked))
+
+    def _bring(self, review: Review) -> None:
+        """Show the motions that are asked for, as far as they are there; others are ordered."""
+        own = review.take.header.setup
+        wanted = comparison.setup_of(comparison.SMOOTHED, own) if review.smooth else own
+        if wanted != review.setup:
+            motion = self._motion_by(review.take, wanted)
+            if motion is not None:
+                review = reviewing.computed_by(review, wanted, motion)
+        if not review.compare:
+            review = replace(review, comparison=None)
+        elif review.comparison is None or review.comparison.name != review.compare:
+            second = comparison.setup_of(review.compare, own)
+            motion = self._motion_by(review.take, second)
+            if motion is not None:
+                review = reviewing.compared_with(review, second, motion)
+        self.state = replace(self.state, review=review)
+
+    def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
+        motion = kept_motion(take, setup)
+        if motion is None:
+            self._workshop.compute_by(take, setup)
+        return motion
+
     def _show(self, review: Review) -> None:
         notes = noting.Notes()
         try:
@@ -530,7 +562,7 @@ class Studio:
         if review is None:
             return
         window = Window(review.in_s, review.out_s)
-        self._workshop.export(review.take.path, order.content, window, order.page)
+        self._workshop.export(review.take.path, order.content, window, order.page, review.used)
 
     def _send_diagnostics(self, page: int) -> None:
         settings = msgspec.to_builtins(self.store.settings)
@@ -582,8 +614,14 @@ class Studio:
     def _finish_work(self) -> None:
         for outcome in self._workshop.done():
             match outcome:
-                case Computed(take=take):
+                case Computed(take=take, setup=None):
                     self._show_computed(take)
+                case Computed(take=take) if self._is_open(take):
+                    self._ask_of_review()
+                case Uncomputed(take=take, error=error):
+                    self._tell_why(error)
+                    if self._is_open(take) and self.state.review is not None:
+                        self._bring(reviewing.settled(self.state.review))
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
@@ -593,10 +631,10 @@ class Studio:
                     self._solving = False
                     self._calibrator.solved(answer)
                     self._use(answer)
-                case Stopped():
-                    self._tell(" ".join(words.in_words(outcome)))
                 case HandstudioError():
-                    self._say(outcome)
+                    self._tell_why(outcome)
+                case _:
+                    pass  # of a take that is no longer open
         self.state = replace(self.state, work=self._workshop.work)
 
     def _use(self, answer: Answer | HandstudioError) -> None:
@@ -608,6 +646,15 @@ class Studio:
                 self.capture.send(SetHeading(answer.psi_cor))
             case _:
                 pass
+
+    def _tell_why(self, error: HandstudioError) -> None:
+        if isinstance(error, Stopped):
+            self._tell(" ".join(words.in_words(error)))
+        else:
+            self._say(error)
+
+    def _is_open(self, take: Take) -> bool:
+        return self.state.review is not None and self.state.review.take.path == take.path
 
     def _show_computed(self, take: Take) -> None:
         motion = kept_motion(take)

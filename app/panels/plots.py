@@ -36,6 +36,7 @@ class PlotsPanel:
         with self._tab:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
+        self._two = False  # each curve is there twice
         self._dark = True
         self._heads: list[viser.GuiHtmlHandle] = []
         self._handles: list[viser.GuiUplotHandle] = []
@@ -43,16 +44,18 @@ class PlotsPanel:
     def render(self, curves: Curves | None, dark: bool) -> None:
         """Show curves, or that there are none."""
         plots = curves.plots if curves is not None else ()
-        if (plots, dark) != (self._plots, self._dark):
-            self._dark = dark
+        two = curves is not None and curves.second is not None
+        if (plots, two, dark) != (self._plots, self._two, self._dark):
+            self._dark, self._two = dark, two
             self._build(plots)
         if curves is None:
             return
         first = 0
-        for plot, handle in zip(plots, self._handles, strict=True):
-            last = first + len(plot.curves)
-            handle.data = _data(curves, curves.values[:, first:last])
-            first = last
+        for plot, head, handle in zip(plots, self._heads, self._handles, strict=True):
+            part = slice(first, first + len(plot.curves))
+            put(head, content=_head(plot, dark, _of(curves.rms_deg, part)))
+            handle.data = _data(curves, part)
+            first = part.stop
 
     def render_health(self, content: str) -> None:
         """Show how stream and sensors do."""
@@ -78,10 +81,11 @@ class PlotsPanel:
             uplot.Series(label=curve.label, stroke=colours.css(curve.colour, self._dark), width=1.5)
             for curve in plot.curves
         )
+        second = tuple(_dashed(curve) for curve in curves) if self._two else ()
         playhead = uplot.Series(label=_("now"), stroke="#8a909a", width=1)
         return self._gui.add_uplot(
-            data=tuple(np.zeros(1) for _ in range(len(curves) + 2)),
-            series=(uplot.Series(label="s"), *curves, playhead),
+            data=tuple(np.zeros(1) for _ in range(len(curves) + len(second) + 2)),
+            series=(uplot.Series(label="s"), *curves, *second, playhead),
             scales={"x": {"time": False}},
             axes=(
                 {"stroke": _AXIS, "grid": _GRID, "size": 30},
@@ -93,12 +97,21 @@ class PlotsPanel:
         )
 
 
-def _head(plot: Plot, dark: bool) -> str:
-    """Title, unit and which colour is what, in one line above the plot."""
+def _dashed(curve: uplot.Series) -> uplot.Series:
+    return uplot.Series(label=curve["label"], stroke=curve["stroke"], width=1, dash=(5, 4))
+
+
+def _of(figures: Array | None, part: slice) -> Array | None:
+    return None if figures is None else figures[..., part]
+
+
+def _head(plot: Plot, dark: bool, rms_deg: Array | None = None) -> str:
+    """Title, unit, which colour is what and by how much it differs, in a line above the plot."""
+    figures = np.full(len(plot.curves), np.nan) if rms_deg is None else rms_deg
     labels = " ".join(
         f'<span style="color:{colours.css(curve.colour, dark)};white-space:nowrap">'
-        f"&#9632; {html.escape(curve.label)}</span>"
-        for curve in plot.curves
+        f"&#9632; {html.escape(curve.label)}{_figure(float(figure))}</span>"
+        for curve, figure in zip(plot.curves, figures, strict=True)
     )
     return (
         '<div style="font-size:.78rem;line-height:1.3;padding:.35em .75em 0">'
@@ -106,12 +119,19 @@ def _head(plot: Plot, dark: bool) -> str:
     )
 
 
-def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
+def _figure(rms_deg: float) -> str:
+    return f" {rms_deg:.1f}°" if np.isfinite(rms_deg) else ""
+
+
+def _data(curves: Curves, part: slice) -> tuple[Array, ...]:
     """Aligned data: time, the curves, and the playhead as a spike from the lowest to the highest.
 
     It lies on the lower edge of the plot elsewhere, and its ends hold the plot's limits still.
     Holes (NaN) would upset the page's own ranging, so there are none.
     """
+    second = _of(curves.second, part)
+    shown = [curves.values[:, part], *([] if second is None else [second])]
+    values = np.concatenate(shown, axis=1)
     low, high = _limits(values)
     time_s, columns = curves.time_s, list(values.T)
     # live, it stands at the newest instant: beyond it the curves would be drawn without data
