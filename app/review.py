@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import values_of
+from app.channels import sds_of, values_of
 from app.comparison import Comparison, compared, picked, seconds_of
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
@@ -30,6 +30,7 @@ class Review:
     time_s: Float[Array, " n"]
     plot_time_s: Float[Array, " p"]
     plot_values: Float[Array, "p c"]
+    plot_sds: Float[Array, "p c"]  # [deg], inf where the filter does not tell
     at_s: float = 0.0
     playing: bool = False
     speed: float = 1.0
@@ -84,8 +85,9 @@ def opened(take: Take, motion: Motion, setup: Setup | None = None) -> Review:
         raise _nothing_in(take)
     time_s = seconds_of(motion)
     shown = np.unique(np.linspace(0, len(time_s) - 1, _PLOTTED).round().astype(int))
-    values = values_of(take.header.setup if setup is None else setup, picked(motion, shown))
-    return Review(take, motion, time_s, time_s[shown], values, used=setup)
+    by, few = setup or take.header.setup, picked(motion, shown)
+    curves = values_of(by, few), sds_of(by, few)
+    return Review(take, motion, time_s, time_s[shown], *curves, used=setup)
 
 
 def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:

@@ -9,13 +9,15 @@ import viser
 from viser import uplot
 
 from app import colours
-from app.channels import Plot
+from app.channels import Curve, Plot
 from app.panels.base import put
 from app.views.page import Curves
 from app.words import _
 from handstudio.arrays import Array
 
 _HEIGHT = 164
+_VEIL = "38"  # how much of a band's colour is seen, as a page writes it
+_WIDEST = 30.0  # [deg]: a band is not to press the curves flat
 _AXIS = "#9aa0aa"
 _GRID: uplot.Axis_Grid = {"stroke": "rgba(128,132,140,0.22)", "width": 1}
 
@@ -36,7 +38,7 @@ class PlotsPanel:
         with self._tab:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
-        self._two = False  # each curve is there twice
+        self._more = False, False  # bands of error, and second curves
         self._dark = True
         self._heads: list[viser.GuiHtmlHandle] = []
         self._handles: list[viser.GuiUplotHandle] = []
@@ -44,9 +46,9 @@ class PlotsPanel:
     def render(self, curves: Curves | None, dark: bool) -> None:
         """Show curves, or that there are none."""
         plots = curves.plots if curves is not None else ()
-        two = curves is not None and curves.second is not None
-        if (plots, two, dark) != (self._plots, self._two, self._dark):
-            self._dark, self._two = dark, two
+        more = _more(curves)
+        if (plots, more, dark) != (self._plots, self._more, self._dark):
+            self._dark, self._more = dark, more
             self._build(plots)
         if curves is None:
             return
@@ -77,15 +79,23 @@ class PlotsPanel:
                 self._handles.append(self._add(plot))
 
     def _add(self, plot: Plot) -> viser.GuiUplotHandle:
-        curves = tuple(
-            uplot.Series(label=curve.label, stroke=colours.css(curve.colour, self._dark), width=1.5)
-            for curve in plot.curves
-        )
-        second = tuple(_dashed(curve) for curve in curves) if self._two else ()
-        playhead = uplot.Series(label=_("now"), stroke="#8a909a", width=1)
+        banded, twice = self._more
+        tints = [colours.css(curve.colour, self._dark) for curve in plot.curves]
+        series = [uplot.Series(label="s")]
+        bands: list[uplot.Band] = []
+        for tint in tints if banded else []:
+            # an upper and a lower edge, and what is between them
+            bands.append({"series": (len(series), len(series) + 1), "fill": f"{tint}{_VEIL}"})
+            series += [_edge(), _edge()]
+        for curve, tint in zip(plot.curves, tints, strict=True):
+            series.append(uplot.Series(label=curve.label, stroke=tint, width=1.5))
+        for curve in plot.curves if twice else ():
+            series.append(_dashed(curve, self._dark))
+        series.append(uplot.Series(label=_("now"), stroke="#8a909a", width=1))
         return self._gui.add_uplot(
-            data=tuple(np.zeros(1) for _ in range(len(curves) + len(second) + 2)),
-            series=(uplot.Series(label="s"), *curves, *second, playhead),
+            data=tuple(np.zeros(1) for _ in series),
+            series=tuple(series),
+            bands=tuple(bands) or None,
             scales={"x": {"time": False}},
             axes=(
                 {"stroke": _AXIS, "grid": _GRID, "size": 30},
@@ -97,8 +107,18 @@ class PlotsPanel:
         )
 
 
-def _dashed(curve: uplot.Series) -> uplot.Series:
-    return uplot.Series(label=curve["label"], stroke=curve["stroke"], width=1, dash=(5, 4))
+def _more(curves: Curves | None) -> tuple[bool, bool]:
+    """Whether there are bands of error, and second curves."""
+    return (False, False) if curves is None else (curves.sds is not None, curves.second is not None)
+
+
+def _edge() -> uplot.Series:
+    return uplot.Series(label="±", stroke="transparent", width=0, points={"show": False})
+
+
+def _dashed(curve: Curve, dark: bool) -> uplot.Series:
+    stroke = colours.css(colours.apart(curve.colour, dark), dark=True)
+    return uplot.Series(label=curve.label, stroke=stroke, width=1, dash=(6, 5))
 
 
 def _of(figures: Array | None, part: slice) -> Array | None:
@@ -131,7 +151,7 @@ def _data(curves: Curves, part: slice) -> tuple[Array, ...]:
     """
     second = _of(curves.second, part)
     shown = [curves.values[:, part], *([] if second is None else [second])]
-    values = np.concatenate(shown, axis=1)
+    values = np.concatenate([*_edges(curves, part), *shown], axis=1)
     low, high = _limits(values)
     time_s, columns = curves.time_s, list(values.T)
     # live, it stands at the newest instant: beyond it the curves would be drawn without data
@@ -143,6 +163,16 @@ def _data(curves: Curves, part: slice) -> tuple[Array, ...]:
     spike = np.full(len(time_s) + 2, low)
     spike[at : at + 2] = high
     return (np.insert(time_s, at, edge), *columns, spike)
+
+
+def _edges(curves: Curves, part: slice) -> list[Array]:
+    """Upper and lower edge of each curve's band, side by side; no width where nobody knows."""
+    sds = _of(curves.sds, part)
+    if sds is None:
+        return []
+    off = np.minimum(np.where(np.isfinite(sds), sds, 0.0), _WIDEST)
+    values = curves.values[:, part]
+    return [np.stack([values + off, values - off], axis=2).reshape(len(values), -1)]
 
 
 def _limits(values: Array) -> tuple[float, float]:

@@ -62,6 +62,7 @@ class Curves:
     """Plots with their data; ``now_s`` is where the playhead stands.
 
     Attributes:
+        sds: Standard deviations of the values, inf where the filter does not tell.
         second: The same curves of the motion that is compared with.
         rms_deg: And by how much each differs.
     """
@@ -72,6 +73,7 @@ class Curves:
     from_s: float
     to_s: float
     now_s: float | None
+    sds: Float[Array, "n c"] | None = None
     second: Float[Array, "n c"] | None = None
     rms_deg: Float[Array, " c"] | None = None
 
@@ -161,7 +163,8 @@ def curves_of(state: State) -> Curves | None:
     if review is not None:
         plots = plots_of(review.setup.layout)
         end = max(review.duration_s, 0.1)
-        curves = Curves(plots, review.plot_time_s, review.plot_values, 0.0, end, review.at_s)
+        time_s, values, sds = review.plot_time_s, review.plot_values, review.plot_sds
+        curves = Curves(plots, time_s, values, 0.0, end, review.at_s, _told(sds))
         second = review.comparison
         if second is not None:
             return replace(curves, second=second.values, rms_deg=second.rms_deg)
@@ -171,7 +174,13 @@ def curves_of(state: State) -> Curves | None:
     newest = float(live.time_s[-1])
     start = max(0.0, newest - SPAN_S)
     plots = plots_of(live.setup.layout)
-    return Curves(plots, live.time_s, live.values, start, max(newest, SPAN_S), now_s=None)
+    end = max(newest, SPAN_S)
+    return Curves(plots, live.time_s, live.values, start, end, now_s=None, sds=_told(live.sds))
+
+
+def _told(sds: Float[Array, "n c"]) -> Float[Array, "n c"] | None:
+    """Nothing where no filter tells anything."""
+    return sds if np.isfinite(sds).any() else None
 
 
 def caption_of(state: State) -> str:
