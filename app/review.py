@@ -16,7 +16,7 @@ from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
-_PLOTTED = 1500  # instants in a plot of the whole take: more than it has pixels
+_PLOTTED = 1000  # instants in a plot of the whole take: more than it has pixels
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 

@@ -39,6 +39,7 @@ class PlotsPanel:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
         self._more = False, False  # bands of error, and second curves
+        self._drawn: Curves | None = None
         self._dark = True
         self._heads: list[viser.GuiHtmlHandle] = []
         self._handles: list[viser.GuiUplotHandle] = []
@@ -52,6 +53,9 @@ class PlotsPanel:
             self._build(plots)
         if curves is None:
             return
+        if _same(curves, self._drawn):
+            return  # a take that stands still costs nothing
+        self._drawn = curves
         first = 0
         for plot, head, handle in zip(plots, self._heads, self._handles, strict=True):
             part = slice(first, first + len(plot.curves))
@@ -71,7 +75,7 @@ class PlotsPanel:
         for handle in (*self._heads, *self._handles):
             handle.remove()
         self._heads, self._handles = [], []
-        self._plots = plots
+        self._plots, self._drawn = plots, None
         self._empty.visible = not plots
         with self._tab:
             for plot in plots:
@@ -105,6 +109,13 @@ class PlotsPanel:
             height=_HEIGHT,
             padding=(8, 12, 0, 0),
         )
+
+
+def _same(curves: Curves, drawn: Curves | None) -> bool:
+    """Whether these are the values that were drawn last, with the playhead where it was."""
+    if drawn is None or curves.now_s != drawn.now_s:
+        return False
+    return curves.values is drawn.values and curves.second is drawn.second
 
 
 def _more(curves: Curves | None) -> tuple[bool, bool]:
