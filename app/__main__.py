@@ -15,6 +15,7 @@ from types import FrameType
 from app import intents
 from app.jobs import Jobs
 from app.journal import Journal
+from app.preparing import Preparation
 from app.server import HOST, Server
 from app.state import State
 from app.studio import Studio
@@ -83,6 +84,7 @@ def _serve(options: Options, scrubber: Scrubber) -> int:
         signal.signal(name, end)
     capture, jobs, store = Capture(), Jobs(), SettingsStore.opened()
     capture.start()
+    preparation: Preparation | None = None
     try:
         studio = Studio(capture, jobs, store, State(options.sessions), options.language)
         server = Server(studio, options.port, options.host, options.token)
@@ -92,11 +94,15 @@ def _serve(options: Options, scrubber: Scrubber) -> int:
         if options.browser:
             webbrowser.open(server.browser_url())
         _begin(studio, options.address)
+        preparation = Preparation()
+        studio.prepare(preparation)
         _loop(studio, server, Journal(scrubber), ended)
         server.close()
     finally:
         capture.stop()
         jobs.close()
+        if preparation is not None:
+            preparation.close()
         store.flush()
         for report in capture.reports():
             out.print(str(getattr(report, "path", report)))

@@ -12,6 +12,8 @@ from jaxtyping import Float
 from app import colours
 from app.words import _, language
 from handstudio.arrays import Array
+from handstudio.hand.angles import joint_index
+from handstudio.hand.skeleton import SEGMENTS
 from handstudio.kinematics import angles_of, measured_angles, relative_rotations
 from handstudio.layout import Layout
 from handstudio.maths import so3
@@ -56,6 +58,36 @@ def values_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
         degrees: Array = np.rad2deg(angles_of(setup, motion, wanted))
         return degrees
     return _sensor_values(setup.layout, motion)
+
+
+def sds_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
+    """How sure the filter is of each curve: standard deviations [deg]; inf where it does not tell.
+
+    Of an angle it is that of the joint's child relative to the sensor before the joint.
+    """
+    layout = setup.layout
+    columns = _hand_sources(layout) if layout.is_hand else _sensor_sources(layout)
+    degrees: Array = np.rad2deg(
+        motion.sd_rad[:, [s for s, _of in columns], [k for _, k in columns]]
+    )
+    return degrees
+
+
+_OWN, _RELATIVE = 0, 1  # of `Motion.sd_rad`
+
+
+def _hand_sources(layout: Layout) -> list[tuple[int, int]]:
+    joints = {angle.name: angle.joint for angle in measured_angles(layout)}
+    names = [name for _plot, names in _hand_plots(layout, language()) for name in names]
+    children = [SEGMENTS[joint_index(joints[name])] for name in names]
+    return [(layout.drivers[child], _RELATIVE) for child in children]
+
+
+def _sensor_sources(layout: Layout) -> list[tuple[int, int]]:
+    shown = range(min(len(layout.names), _MOST_SENSORS))
+    own = [(sensor, _OWN) for sensor in shown for _part in range(3)]
+    joints = layout.instrumented_joints
+    return own + [(layout.drivers[joint.child], _RELATIVE) for joint in joints]
 
 
 @cache

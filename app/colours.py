@@ -51,6 +51,13 @@ def css(colour: tuple[int, int, int], dark: bool = True) -> str:
     return "#{:02x}{:02x}{:02x}".format(*(round(share * channel) for channel in colour))
 
 
+def apart(colour: tuple[int, int, int], dark: bool) -> tuple[int, int, int]:
+    """The same colour for a second curve over the first: lighter on dark pages, else darker."""
+    towards = 255 if dark else 0
+    red, green, blue = ((channel + towards) // 2 for channel in colour)
+    return red, green, blue
+
+
 def pale(colour: tuple[int, int, int]) -> tuple[int, int, int]:
     """The same colour in doubt: half way to grey."""
     red, green, blue = ((channel + 2 * 120) // 3 for channel in colour)

@@ -36,6 +36,13 @@ class BlinkSensor:
 
 
 @dataclass(frozen=True, slots=True)
+class SetFilter:
+    """Fuse by the filter of this name from now on; empty: by the one that suits the device."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class Perform:
     """Let the wearer of the virtual glove do this."""
 
@@ -323,6 +330,20 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
+class Smooth:
+    """Show the open take with its future taken in, or as it was live."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """Show the open take a second time, by another filter or smoothed; empty: no more."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class FaceForward:
     """Turn the picture so that the forearm points away from the viewer."""
 
@@ -382,6 +403,7 @@ Intent: TypeAlias = (
     | ConnectDevice
     | DisconnectDevice
     | BlinkSensor
+    | SetFilter
     | Perform
     | ChooseSubject
     | SaveSubject
@@ -424,6 +446,8 @@ Intent: TypeAlias = (
     | WholeTake
     | SetLoop
     | Export
+    | Smooth
+    | Compare
     | FaceForward
     | BeginCourse
     | Guide

@@ -15,6 +15,7 @@ from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.process import process
 from handstudio.recording.take import open_take
+from handstudio.setup import Setup
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
 _share: Synchronized[float] | None = None
@@ -48,15 +49,17 @@ class Jobs:
         """Start the process before it is needed."""
         self._pool.submit(_nothing)
 
-    def process(self, path: Path) -> Future[None]:
-        """Compute the motion of a take, so that opening it finds it."""
+    def process(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        """Compute the motion of a take, by its own setup or another: opening it then finds it."""
         self._reset()
-        return self._pool.submit(_process, path)
+        return self._pool.submit(_process, path, setup)
 
-    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
-        """Write a CSV of a part of a take."""
+    def export(
+        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+    ) -> Future[Path]:
+        """Write a CSV of a part of a take, by its own setup or another."""
         self._reset()
-        return self._pool.submit(_export, path, target, content, window)
+        return self._pool.submit(_export, path, target, content, window, setup)
 
     def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
         """Compute what a course is for from its takes, and keep what is to be used from now on."""
@@ -100,14 +103,17 @@ def _nothing() -> None:
     pass
 
 
-def _process(path: Path) -> None:
-    process(open_take(path), progress=_tell)
+def _process(path: Path, setup: Setup | None) -> None:
+    process(open_take(path), setup, progress=_tell)
 
 
-def _export(path: Path, target: Path, content: Content, window: Window) -> Path:
+def _export(
+    path: Path, target: Path, content: Content, window: Window, setup: Setup | None
+) -> Path:
     take = open_take(path)
-    motion = process(take, progress=_tell)
-    return export_csv(take, take.header.setup, motion, target, content=content, window=window)
+    chosen = setup or take.header.setup
+    motion = process(take, chosen, progress=_tell)
+    return export_csv(take, chosen, motion, target, content=content, window=window)
 
 
 def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:

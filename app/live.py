@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import values_of
+from app.channels import sds_of, values_of
 from handstudio.arrays import Array
 from handstudio.pipeline import Motion, empty, join
 from handstudio.setup import Setup
@@ -26,6 +26,7 @@ class LiveHistory:
     next_us: int
     time_s: Float[Array, " n"]
     values: Float[Array, "n c"]
+    sds: Float[Array, "n c"]  # [deg], inf where the filter does not tell
 
 
 def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion]) -> LiveHistory:
@@ -41,6 +42,7 @@ def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion
         return history
     time_s = np.concatenate([history.time_s, (kept.time_us - start) * 1e-6])
     values = np.concatenate([history.values, values_of(setup, kept)])
+    sds = np.concatenate([history.sds, sds_of(setup, kept)])
     recent = time_s >= time_s[-1] - SPAN_S
     return replace(
         history,
@@ -48,12 +50,14 @@ def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion
         next_us=(int(kept.time_us[-1]) // _STEP_US + 1) * _STEP_US,
         time_s=time_s[recent],
         values=values[recent],
+        sds=sds[recent],
     )
 
 
 def _begun(setup: Setup) -> LiveHistory:
-    none = values_of(setup, empty(len(setup.layout.sensors)))
-    return LiveHistory(setup, 0, np.iinfo(np.int64).min, np.empty(0), none)
+    nothing = empty(len(setup.layout.sensors))
+    curves = values_of(setup, nothing), sds_of(setup, nothing)
+    return LiveHistory(setup, 0, np.iinfo(np.int64).min, np.empty(0), *curves)
 
 
 def _thinned(motion: Motion, next_us: int) -> Motion:

@@ -1,4 +1,4 @@
-"""A take on the screen: its motion, where in it we are, and how fast it plays."""
+"""A take on the screen: its motion, another to compare, where in it we are, how fast it plays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import values_of
+from app.channels import sds_of, values_of
+from app.comparison import Comparison, compared, picked, seconds_of
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.pipeline import Motion
@@ -15,7 +16,7 @@ from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
-_PLOTTED = 1500  # instants in a plot of the whole take: more than it has pixels
+_PLOTTED = 1000  # instants in a plot of the whole take: more than it has pixels
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
@@ -29,6 +30,7 @@ class Review:
     time_s: Float[Array, " n"]
     plot_time_s: Float[Array, " p"]
     plot_values: Float[Array, "p c"]
+    plot_sds: Float[Array, "p c"]  # [deg], inf where the filter does not tell
     at_s: float = 0.0
     playing: bool = False
     speed: float = 1.0
@@ -36,11 +38,20 @@ class Review:
     out_s: float | None = None  # None: to the end
     loop: bool = False
     notes: Notes = Notes()
+    used: Setup | None = None  # what this motion was computed by; None: the take's own
+    smooth: bool = False  # somebody wants it smoothed; it is once that is computed
+    compare: str = ""  # and compared with this one, or nothing
+    comparison: Comparison | None = None
 
     @property
     def setup(self) -> Setup:
         """What decided this motion."""
-        return self.take.header.setup
+        return self.used or self.take.header.setup
+
+    @property
+    def plotted(self) -> Motion:
+        """The instants that are in the plots."""
+        return picked(self.motion, np.searchsorted(self.time_s, self.plot_time_s))
 
     @property
     def duration_s(self) -> float:
@@ -64,22 +75,50 @@ class Review:
         return self.motion[self.index : self.index + 1]
 
 
-def opened(take: Take, motion: Motion) -> Review:
-    """A take at its beginning, paused.
+def opened(take: Take, motion: Motion, setup: Setup | None = None) -> Review:
+    """A take at its beginning, paused; ``setup`` is what the motion was computed by, if another.
 
     Raises:
         TakeError: nothing moves in it.
     """
     if len(motion) == 0:
-        raise TakeError(
-            "{name} holds no instant of motion.",
-            "The device sent nothing while it was recorded; record it again.",
-            name=take.path.name,
-        )
-    time_s = np.asarray((motion.time_us - motion.time_us[0]) * 1e-6)
+        raise _nothing_in(take)
+    time_s = seconds_of(motion)
     shown = np.unique(np.linspace(0, len(time_s) - 1, _PLOTTED).round().astype(int))
-    few = Motion(*(getattr(motion, name)[shown] for name in Motion.__slots__))
-    return Review(take, motion, time_s, time_s[shown], values_of(take.header.setup, few))
+    by, few = setup or take.header.setup, picked(motion, shown)
+    curves = values_of(by, few), sds_of(by, few)
+    return Review(take, motion, time_s, time_s[shown], *curves, used=setup)
+
+
+def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
+    """The same take at the same place by another setup, compared with nothing yet."""
+    new = opened(review.take, motion, setup)
+    same = {
+        name: getattr(review, name)
+        for name in ("playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare")
+    }
+    return replace(new, at_s=min(review.at_s, new.duration_s), **same)
+
+
+def compared_with(review: Review, setup: Setup, motion: Motion) -> Review:
+    """The take with the second motion that was asked for.
+
+    Raises:
+        TakeError: nothing moves in it.
+    """
+    if len(motion) == 0:
+        raise _nothing_in(review.take)
+    plotted = review.plotted
+    found = compared(review.compare, setup, motion, plotted, review.plot_values)
+    return replace(review, comparison=found)
+
+
+def settled(review: Review) -> Review:
+    """What was asked for and will not come is asked for no more."""
+    comparison = review.comparison
+    return replace(
+        review, smooth=review.setup.smooth, compare="" if comparison is None else comparison.name
+    )
 
 
 def advanced(review: Review, elapsed_s: float) -> Review:
@@ -138,3 +177,11 @@ def at_next_mark(review: Review, *, forward: bool) -> Review:
         ahead = [at for at in marks if at > review.at_s + apart]
         return sought(review, min(ahead, default=review.duration_s))
     return sought(review, max((at for at in marks if at < review.at_s + apart), default=0.0))
+
+
+def _nothing_in(take: Take) -> TakeError:
+    return TakeError(
+        "{name} holds no instant of motion.",
+        "The device sent nothing while it was recorded; record it again.",
+        name=take.path.name,
+    )

@@ -242,7 +242,7 @@ class _GhostNodes:
         for bones in self._sets:
             handle = self._bones[bones.mesh]
             q, t = bones.placed(view.pose)
-            handle.batched_wxyzs, handle.batched_positions = q, t + _BESIDE[view.skeleton.side]
+            handle.batched_wxyzs, handle.batched_positions = q, t + _place(view)
 
     def clear(self) -> None:
         for handle in self._bones.values():
@@ -276,13 +276,19 @@ class _GhostNodes:
                 cast_shadow=False,
                 lod="off",
             )
-        self._label = self._server.scene.add_label(
-            "/ghost/words",
-            view.words,
-            position=view.pose.t_world_tip[_MIDDLE] + _BESIDE[view.skeleton.side] + _ABOVE,
-            font_screen_scale=1.1,
-            anchor="bottom-center",
-        )
+        if view.words:
+            self._label = self._server.scene.add_label(
+                "/ghost/words",
+                view.words,
+                position=view.pose.t_world_tip[_MIDDLE] + _place(view) + _ABOVE,
+                font_screen_scale=1.1,
+                anchor="bottom-center",
+            )
+
+
+def _place(view: GhostView) -> Array:
+    """Where a ghost stands, from where the hand does."""
+    return _BESIDE[view.skeleton.side] if view.beside else np.zeros(3)
 
 
 class _BoardNodes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from app.guided import Guided, InUse, Result, Stand
 from app.live import LiveHistory
@@ -22,6 +23,10 @@ from handstudio.settings import Settings
 
 HAND_LENGTH_MM = (120.0, 240.0)
 """Plausible hand lengths, children to the largest adults [mm]."""
+
+
+Preparing: TypeAlias = Literal["no", "yes", "failed"]
+"""Whether the whole-hand filter is being prepared, while another one serves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,7 @@ class State:
         yaw: Turn of the picture about the vertical; None: to be found anew.
         stands: Where the courses of the subject and the device stand.
         in_use: The calibrations that are in use.
+        preparing: Whether the whole-hand filter is still awaited.
         guided: The course that is on.
         result: What came of the last course, until somebody has seen it.
         asking: The page that must say whose hand it is before a take can begin.
@@ -98,6 +104,7 @@ class State:
     review: Review | None = None
     stands: tuple[Stand, ...] = ()
     in_use: InUse = InUse()
+    preparing: Preparing = "no"
     guided: Guided | None = None
     result: Result | None = None
     work: Work | None = None

@@ -13,10 +13,11 @@ from typing import Any
 
 import msgspec
 
-from app import diagnostics, intents, shaken, words
+from app import comparison, diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
+from app.filtering import Chooser, Prepared
 from app.holding import Holder
 from app.jobs import Jobs, Stopped
 from app.keeping import Keeper
@@ -28,7 +29,7 @@ from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Solved, Workshop
+from app.workshop import Computed, Exported, Gathered, Solved, Uncomputed, Workshop
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
@@ -46,6 +47,7 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Window
+from handstudio.pipeline import Motion
 from handstudio.process import kept_motion
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
@@ -76,6 +78,7 @@ class Studio:
         self._taker = Taker(self.capture, self.state.sessions)
         self._calibrator = Calibrator(self.capture, self._taker, self.state.sessions)
         self._holder = Holder(self.capture, self.state.sessions)
+        self._chooser = Chooser(self.capture)
         self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
@@ -91,6 +94,10 @@ class Studio:
         """Ask for something; returns at once. For any thread."""
         self._inbox.put(intent)
 
+    def prepare(self, preparation: Prepared) -> None:
+        """Use the whole-hand filter for hands once this has got it ready."""
+        self._chooser.preparation = preparation
+
     def tick(self, elapsed_s: float) -> State:
         """Take in all that happened; the state afterwards."""
         told = replace(self.state, messages=(), downloads=(), sounds=())
@@ -105,6 +112,7 @@ class Studio:
         self._finish_work()
         self._take_on(elapsed_s)
         self._guide_on(elapsed_s)
+        self.state = replace(self.state, preparing=self._chooser.follow(self.state))
         idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
         self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
         self.state = replace(self.state, searching=self._looker.busy)
@@ -138,7 +146,7 @@ class Studio:
             self._say(error)
         self._take_shelf()
 
-    def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
+    def _obey(self, intent: intents.Intent) -> bool:  # noqa: PLR0912, PLR0915 - a list
         """Devices, recording, opening; False: it is about something else."""
         match intent:
             case intents.FindDevices():
@@ -171,6 +179,10 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.Smooth(on=on):
+                self._ask_of_review(smooth=on)
+            case intents.Compare(name=name):
+                self._ask_of_review(compare=name)
             case intents.CancelWork():
                 self._workshop.cancel()
             case intents.SendDiagnostics(page=page):
@@ -266,6 +278,8 @@ class Studio:
                 change(countdown_s=seconds)
             case intents.SetSounds(on=on):
                 change(sounds=on)
+            case intents.SetFilter(name=name):
+                change(filter=name)
             case intents.SetTheme(dark=dark):
                 change(theme="dark" if dark else "light")
             case intents.SetLanguage(language=language):
@@ -484,6 +498,33 @@ class Studio:
             return
         self._workshop.compute(take)
 
+    def _ask_of_review(self, **asked: Any) -> None:
+        if self.state.review is not None:
+            self._bring(replace(self.state.review, **asked))
+
+    def _bring(self, review: Review) -> None:
+        """Show the motions that are asked for, as far as they are there; others are ordered."""
+        own = review.take.header.setup
+        wanted = comparison.setup_of(comparison.SMOOTHED, own) if review.smooth else own
+        if wanted != review.setup:
+            motion = self._motion_by(review.take, wanted)
+            if motion is not None:
+                review = reviewing.computed_by(review, wanted, motion)
+        if not review.compare:
+            review = replace(review, comparison=None)
+        elif review.comparison is None or review.comparison.name != review.compare:
+            second = comparison.setup_of(review.compare, own)
+            motion = self._motion_by(review.take, second)
+            if motion is not None:
+                review = reviewing.compared_with(review, second, motion)
+        self.state = replace(self.state, review=review)
+
+    def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
+        motion = kept_motion(take, setup)
+        if motion is None:
+            self._workshop.compute_by(take, setup)
+        return motion
+
     def _show(self, review: Review) -> None:
         notes = noting.Notes()
         try:
@@ -521,7 +562,7 @@ class Studio:
         if review is None:
             return
         window = Window(review.in_s, review.out_s)
-        self._workshop.export(review.take.path, order.content, window, order.page)
+        self._workshop.export(review.take.path, order.content, window, order.page, review.used)
 
     def _send_diagnostics(self, page: int) -> None:
         settings = msgspec.to_builtins(self.store.settings)
@@ -573,8 +614,14 @@ class Studio:
     def _finish_work(self) -> None:
         for outcome in self._workshop.done():
             match outcome:
-                case Computed(take=take):
+                case Computed(take=take, setup=None):
                     self._show_computed(take)
+                case Computed(take=take) if self._is_open(take):
+                    self._ask_of_review()
+                case Uncomputed(take=take, error=error):
+                    self._tell_why(error)
+                    if self._is_open(take) and self.state.review is not None:
+                        self._bring(reviewing.settled(self.state.review))
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
@@ -584,10 +631,10 @@ class Studio:
                     self._solving = False
                     self._calibrator.solved(answer)
                     self._use(answer)
-                case Stopped():
-                    self._tell(" ".join(words.in_words(outcome)))
                 case HandstudioError():
-                    self._say(outcome)
+                    self._tell_why(outcome)
+                case _:
+                    pass  # of a take that is no longer open
         self.state = replace(self.state, work=self._workshop.work)
 
     def _use(self, answer: Answer | HandstudioError) -> None:
@@ -599,6 +646,15 @@ class Studio:
                 self.capture.send(SetHeading(answer.psi_cor))
             case _:
                 pass
+
+    def _tell_why(self, error: HandstudioError) -> None:
+        if isinstance(error, Stopped):
+            self._tell(" ".join(words.in_words(error)))
+        else:
+            self._say(error)
+
+    def _is_open(self, take: Take) -> bool:
+        return self.state.review is not None and self.state.review.take.path == take.path
 
     def _show_computed(self, take: Take) -> None:
         motion = kept_motion(take)

@@ -15,13 +15,23 @@ from app.words import _
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window
 from handstudio.recording.take import Take
+from handstudio.setup import Setup
 
 
 @dataclass(frozen=True, slots=True)
 class Computed:
-    """The motion of this take is there now."""
+    """The motion of this take is there now, by its own setup or another."""
 
     take: Take
+    setup: Setup | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Uncomputed:
+    """The motion of this take by another setup will not be there, and why not."""
+
+    take: Take
+    error: HandstudioError
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +55,7 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = Computed | Exported | Gathered | Solved
+Outcome = Computed | Uncomputed | Exported | Gathered | Solved
 
 
 @dataclass
@@ -77,15 +87,28 @@ class Workshop:
         future = self.jobs.process(take.path)
         self._pending.append(_Pending(future, lambda _result: Computed(take), words))
 
-    def export(self, path: Path, content: Content, window: Window, page: int) -> None:
-        """A CSV of a part of a take, beside it."""
+    def compute_by(self, take: Take, setup: Setup) -> None:
+        """The motion of a take by another setup."""
+
+        def fail(error: HandstudioError) -> Outcome:
+            return Uncomputed(take, error)
+
+        smooth = _("Smoothing {name}"), _("Computing the motion of {name}")
+        words = smooth[not setup.smooth].format(name=take.path.stem)
+        future = self.jobs.process(take.path, setup)
+        self._pending.append(_Pending(future, lambda _result: Computed(take, setup), words, fail))
+
+    def export(
+        self, path: Path, content: Content, window: Window, page: int, setup: Setup | None = None
+    ) -> None:
+        """A CSV of a part of a take, beside it, by its own setup or another."""
         target = path.with_suffix(f".{content}.csv")
 
         def use(written: Path) -> Outcome:
             return Exported(Download(page, written.name, written))
 
         words = _("Exporting {name}").format(name=target.name)
-        future = self.jobs.export(path, target, content, window)
+        future = self.jobs.export(path, target, content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:

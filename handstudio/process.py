@@ -86,9 +86,14 @@ def process(
     return motion
 
 
-def kept_motion(take: Take) -> Motion | None:
-    """The motion of a take where it was computed before and is whole, else None."""
-    return _opened(motion_folder(take, take.header.setup, from_start=False))
+def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
+    """The motion of a take where it was computed before and is whole, else None.
+
+    ``setup`` is another one than the take's own.
+    """
+    own = take.header.setup
+    chosen = setup or own
+    return _opened(motion_folder(take, chosen, from_start=chosen != own))
 
 
 def aligned_setup(take: Take, setup: Setup | None = None) -> tuple[Setup, HeadingAlignment]:

@@ -56,6 +56,7 @@ class Settings(msgspec.Struct, frozen=True):
         side: Which hand, where a device does not know.
         hand_length_mm: Of a subject whose hand was not measured.
         plot_span_s: How much time live plots show.
+        filter: Name of the live filter; empty: whatever suits the device.
     """
 
     language: str = ""
@@ -71,6 +72,7 @@ class Settings(msgspec.Struct, frozen=True):
     side: HandSide = "right"
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3
     plot_span_s: float = 10.0
+    filter: str = ""
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

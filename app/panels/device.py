@@ -5,9 +5,11 @@ from __future__ import annotations
 import viser
 
 from app import intents
-from app.panels.base import QUIET, Send, put
+from app.filtering import wanted_of
+from app.panels.base import QUIET, Send, put, typed
 from app.panels.virtual import VirtualPanel
 from app.state import State
+from app.views.filters import filter_words, preparing_of
 from app.words import _
 from handstudio.device.addresses import is_virtual
 from handstudio.device.find import VIRTUAL, Found
@@ -41,10 +43,20 @@ class DevicePanel:
             hint=_("Its light on the glove blinks for three seconds"),
             visible=False,
         )
+        self._words = filter_words()
+        self._filter = gui.add_dropdown(
+            _("Filter"),
+            tuple(self._words.values()),
+            initial_value=self._words[wanted_of(state)],
+            hint=_("What turns readings into orientations; another one begins anew at a rest"),
+        )
+        self._preparing = gui.add_markdown("", visible=False)
         self._connected = False
         self._connect.on_click(lambda _event: self._toggle())
         self._find.on_click(lambda _event: send(intents.FindDevices()))
         self._blink.on_click(lambda _event: send(intents.BlinkSensor(self._blink_choice.value)))
+        names = {words: name for name, words in self._words.items()}
+        self._filter.on_update(typed(lambda words: send(intents.SetFilter(names[words]))))
 
     def render(self, state: State) -> None:
         """Show devices and what the present one says of itself."""
@@ -64,6 +76,9 @@ class DevicePanel:
         self._virtual.render(worn, chosen=bool(worn) or chosen)
         looking = _("Looking …") if state.searching else _("Look for devices")
         put(self._find, label=looking, disabled=state.searching)
+        put(self._filter, value=self._words[wanted_of(state)])
+        preparing = preparing_of(state)
+        put(self._preparing, visible=bool(preparing), content=preparing)
         self._render_facts(state)
 
     def _choose_the_last(self) -> None:

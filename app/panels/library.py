@@ -13,6 +13,7 @@ from app.panels.base import QUIET, Send, page_of, put, typed
 from app.panels.sheets import ask_deletion, ask_emptying
 from app.review import Review
 from app.state import Shelf, State
+from app.views.comparison import choices
 from app.views.recording import clock_of
 from app.words import _, in_words
 from handstudio.export.csv import Content
@@ -39,6 +40,7 @@ class LibraryPanel:
         )
         self._contents = _contents(hand=True)
         self._more = gui.add_dropdown(_("Contents"), tuple(self._contents), visible=False)
+        self._motion = MotionFields(gui, send)
         self._notes = NotesFolder(gui, send)
         self._shelf = ShelfFolder(gui, send, self._selected)
         self._opened: Path | None = None
@@ -68,6 +70,7 @@ class LibraryPanel:
             self._contents = _contents(review.setup.layout.is_hand)
             if self._more.options != tuple(self._contents):
                 self._more.options = tuple(self._contents)
+        self._motion.render(review)
         self._notes.render(review)
         self._shelf.render(state)
 
@@ -114,6 +117,36 @@ class LibraryPanel:
         if entry is not None and entry.error is not None:
             return in_words(entry.error)[0] + "\n\n" + _("What was saved can be had back.")
         return _shelf_words(state.shelf)
+
+
+class MotionFields:
+    """How the motion of the open take is computed, and what it is compared with."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._smooth = gui.add_checkbox(
+            _("Smooth"),
+            initial_value=False,
+            hint=_("Takes in what came after, by the whole-hand filter; exported so as well"),
+            visible=False,
+        )
+        self._words = choices()
+        self._compare = gui.add_dropdown(
+            _("Compare with"),
+            tuple(self._words.values()),
+            hint=_("The second hand is pale, its curves dashed; figures are RMS differences"),
+            visible=False,
+        )
+        names = {words: name for name, words in self._words.items()}
+        self._smooth.on_update(typed(lambda on: send(intents.Smooth(on))))
+        self._compare.on_update(typed(lambda words: send(intents.Compare(names[words]))))
+
+    def render(self, review: Review | None) -> None:
+        """Show what was asked for."""
+        for handle in (self._smooth, self._compare):
+            put(handle, visible=review is not None)
+        if review is not None:
+            put(self._smooth, value=review.smooth)
+            put(self._compare, value=self._words[review.compare])
 
 
 class NotesFolder:

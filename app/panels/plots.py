@@ -9,13 +9,15 @@ import viser
 from viser import uplot
 
 from app import colours
-from app.channels import Plot
+from app.channels import Curve, Plot
 from app.panels.base import put
 from app.views.page import Curves
 from app.words import _
 from handstudio.arrays import Array
 
 _HEIGHT = 164
+_VEIL = "38"  # how much of a band's colour is seen, as a page writes it
+_WIDEST = 30.0  # [deg]: a band is not to press the curves flat
 _AXIS = "#9aa0aa"
 _GRID: uplot.Axis_Grid = {"stroke": "rgba(128,132,140,0.22)", "width": 1}
 
@@ -36,6 +38,8 @@ class PlotsPanel:
         with self._tab:
             self._empty = gui.add_markdown(_("Curves appear here once a device sends."))
         self._plots: tuple[Plot, ...] = ()
+        self._more = False, False  # bands of error, and second curves
+        self._drawn: Curves | None = None
         self._dark = True
         self._heads: list[viser.GuiHtmlHandle] = []
         self._handles: list[viser.GuiUplotHandle] = []
@@ -43,16 +47,21 @@ class PlotsPanel:
     def render(self, curves: Curves | None, dark: bool) -> None:
         """Show curves, or that there are none."""
         plots = curves.plots if curves is not None else ()
-        if (plots, dark) != (self._plots, self._dark):
-            self._dark = dark
+        more = _more(curves)
+        if (plots, more, dark) != (self._plots, self._more, self._dark):
+            self._dark, self._more = dark, more
             self._build(plots)
         if curves is None:
             return
+        if _same(curves, self._drawn):
+            return  # a take that stands still costs nothing
+        self._drawn = curves
         first = 0
-        for plot, handle in zip(plots, self._handles, strict=True):
-            last = first + len(plot.curves)
-            handle.data = _data(curves, curves.values[:, first:last])
-            first = last
+        for plot, head, handle in zip(plots, self._heads, self._handles, strict=True):
+            part = slice(first, first + len(plot.curves))
+            put(head, content=_head(plot, dark, _of(curves.rms_deg, part)))
+            handle.data = _data(curves, part)
+            first = part.stop
 
     def render_health(self, content: str) -> None:
         """Show how stream and sensors do."""
@@ -66,7 +75,7 @@ class PlotsPanel:
         for handle in (*self._heads, *self._handles):
             handle.remove()
         self._heads, self._handles = [], []
-        self._plots = plots
+        self._plots, self._drawn = plots, None
         self._empty.visible = not plots
         with self._tab:
             for plot in plots:
@@ -74,14 +83,23 @@ class PlotsPanel:
                 self._handles.append(self._add(plot))
 
     def _add(self, plot: Plot) -> viser.GuiUplotHandle:
-        curves = tuple(
-            uplot.Series(label=curve.label, stroke=colours.css(curve.colour, self._dark), width=1.5)
-            for curve in plot.curves
-        )
-        playhead = uplot.Series(label=_("now"), stroke="#8a909a", width=1)
+        banded, twice = self._more
+        tints = [colours.css(curve.colour, self._dark) for curve in plot.curves]
+        series = [uplot.Series(label="s")]
+        bands: list[uplot.Band] = []
+        for tint in tints if banded else []:
+            # an upper and a lower edge, and what is between them
+            bands.append({"series": (len(series), len(series) + 1), "fill": f"{tint}{_VEIL}"})
+            series += [_edge(), _edge()]
+        for curve, tint in zip(plot.curves, tints, strict=True):
+            series.append(uplot.Series(label=curve.label, stroke=tint, width=1.5))
+        for curve in plot.curves if twice else ():
+            series.append(_dashed(curve, self._dark))
+        series.append(uplot.Series(label=_("now"), stroke="#8a909a", width=1))
         return self._gui.add_uplot(
-            data=tuple(np.zeros(1) for _ in range(len(curves) + 2)),
-            series=(uplot.Series(label="s"), *curves, playhead),
+            data=tuple(np.zeros(1) for _ in series),
+            series=tuple(series),
+            bands=tuple(bands) or None,
             scales={"x": {"time": False}},
             axes=(
                 {"stroke": _AXIS, "grid": _GRID, "size": 30},
@@ -93,12 +111,38 @@ class PlotsPanel:
         )
 
 
-def _head(plot: Plot, dark: bool) -> str:
-    """Title, unit and which colour is what, in one line above the plot."""
+def _same(curves: Curves, drawn: Curves | None) -> bool:
+    """Whether these are the values that were drawn last, with the playhead where it was."""
+    if drawn is None or curves.now_s != drawn.now_s:
+        return False
+    return curves.values is drawn.values and curves.second is drawn.second
+
+
+def _more(curves: Curves | None) -> tuple[bool, bool]:
+    """Whether there are bands of error, and second curves."""
+    return (False, False) if curves is None else (curves.sds is not None, curves.second is not None)
+
+
+def _edge() -> uplot.Series:
+    return uplot.Series(label="±", stroke="transparent", width=0, points={"show": False})
+
+
+def _dashed(curve: Curve, dark: bool) -> uplot.Series:
+    stroke = colours.css(colours.apart(curve.colour, dark), dark=True)
+    return uplot.Series(label=curve.label, stroke=stroke, width=1, dash=(6, 5))
+
+
+def _of(figures: Array | None, part: slice) -> Array | None:
+    return None if figures is None else figures[..., part]
+
+
+def _head(plot: Plot, dark: bool, rms_deg: Array | None = None) -> str:
+    """Title, unit, which colour is what and by how much it differs, in a line above the plot."""
+    figures = np.full(len(plot.curves), np.nan) if rms_deg is None else rms_deg
     labels = " ".join(
         f'<span style="color:{colours.css(curve.colour, dark)};white-space:nowrap">'
-        f"&#9632; {html.escape(curve.label)}</span>"
-        for curve in plot.curves
+        f"&#9632; {html.escape(curve.label)}{_figure(float(figure))}</span>"
+        for curve, figure in zip(plot.curves, figures, strict=True)
     )
     return (
         '<div style="font-size:.78rem;line-height:1.3;padding:.35em .75em 0">'
@@ -106,12 +150,19 @@ def _head(plot: Plot, dark: bool) -> str:
     )
 
 
-def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
+def _figure(rms_deg: float) -> str:
+    return f" {rms_deg:.1f}°" if np.isfinite(rms_deg) else ""
+
+
+def _data(curves: Curves, part: slice) -> tuple[Array, ...]:
     """Aligned data: time, the curves, and the playhead as a spike from the lowest to the highest.
 
     It lies on the lower edge of the plot elsewhere, and its ends hold the plot's limits still.
     Holes (NaN) would upset the page's own ranging, so there are none.
     """
+    second = _of(curves.second, part)
+    shown = [curves.values[:, part], *([] if second is None else [second])]
+    values = np.concatenate([*_edges(curves, part), *shown], axis=1)
     low, high = _limits(values)
     time_s, columns = curves.time_s, list(values.T)
     # live, it stands at the newest instant: beyond it the curves would be drawn without data
@@ -123,6 +174,16 @@ def _data(curves: Curves, values: Array) -> tuple[Array, ...]:
     spike = np.full(len(time_s) + 2, low)
     spike[at : at + 2] = high
     return (np.insert(time_s, at, edge), *columns, spike)
+
+
+def _edges(curves: Curves, part: slice) -> list[Array]:
+    """Upper and lower edge of each curve's band, side by side; no width where nobody knows."""
+    sds = _of(curves.sds, part)
+    if sds is None:
+        return []
+    off = np.minimum(np.where(np.isfinite(sds), sds, 0.0), _WIDEST)
+    values = curves.values[:, part]
+    return [np.stack([values + off, values - off], axis=2).reshape(len(values), -1)]
 
 
 def _limits(values: Array) -> tuple[float, float]:

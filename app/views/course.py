@@ -407,13 +407,15 @@ class GhostView:
         skeleton: Of it.
         pose: Where it is now.
         moving: The segments that the step is about.
-        words: What it is there for.
+        words: What it is there for; empty: that is told elsewhere.
+        beside: Whether it stands beside the other; else in its place.
     """
 
     skeleton: Skeleton
     pose: Pose
     moving: Bool[Array, " k"]
     words: str
+    beside: bool = True
 
 
 def ghost_view(state: State) -> GhostView | None:

@@ -6,10 +6,13 @@ import html
 from dataclasses import dataclass
 
 from app.state import State
+from app.views.trust import distrusted, surest_words
 from app.words import _
 from handstudio.device.orders import Phase
 from handstudio.health.findings import Finding, Kind
 from handstudio.health.view import HealthView, SensorView
+from handstudio.pipeline import Motion
+from handstudio.setup import Setup
 
 PAGE_LATE_MS = 150.0
 """A page that shows a pose this long after it was sent feels detached; half of it is noticed."""
@@ -68,6 +71,8 @@ def as_html(state: State) -> str:
     advices.sort(key=lambda advice: not advice.act)
     parts = [_advice(advice) for advice in advices] or [_all_well(state)]
     parts.append(_sensors(newest.health, newest.findings, names))
+    if newest.motion is not None and newest.phase is Phase.STREAMING:
+        parts.append(_trust(newest.setup, newest.motion))
     parts.append(_figures(newest.health, state.page_ms))
     return "".join(parts)
 
@@ -126,6 +131,24 @@ def _told(name: str, view: SensorView) -> str:
     ]
     told = [f"{words} {value:.3g} {unit}" for words, value, unit in figures if value is not None]
     return "\n".join([name, *told])
+
+
+def _trust(setup: Setup, motion: Motion) -> str:
+    """What is not trusted now, a line a sensor."""
+    found = distrusted(setup, motion)
+    if not found:
+        return _line(surest_words(motion), 0.75)
+    cells = "".join(
+        f'<tr><td style="padding:.05em .8em .05em 0">{html.escape(one.sensor)}</td>'
+        f'<td style="padding:.05em .8em .05em 0">{html.escape(one.segment)}</td>'
+        f'<td style="color:{_AMBER}">{html.escape(one.why)}</td></tr>'
+        for one in found
+    )
+    title = html.escape(_("Not to be trusted now"))
+    return (
+        f'<div style="padding:.3em .75em .4em;font-size:.78rem;line-height:1.3"><b>{title}</b>'
+        f'<table style="border-collapse:collapse">{cells}</table></div>'
+    )
 
 
 def _figures(health: HealthView, page_ms: float | None) -> str:

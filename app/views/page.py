@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -12,6 +12,7 @@ from app.channels import Plot, plots_of
 from app.live import SPAN_S
 from app.look import Camera, View, camera_for, course_camera
 from app.state import State
+from app.views.comparison import comparison_words
 from app.views.health import worst_of
 from app.words import _, in_words
 from handstudio.arrays import Array
@@ -58,7 +59,13 @@ class SensorsView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curves:
-    """Plots with their data; ``now_s`` is where the playhead stands."""
+    """Plots with their data; ``now_s`` is where the playhead stands.
+
+    Attributes:
+        sds: Standard deviations of the values, inf where the filter does not tell.
+        second: The same curves of the motion that is compared with.
+        rms_deg: And by how much each differs.
+    """
 
     plots: tuple[Plot, ...]
     time_s: Float[Array, " n"]
@@ -66,6 +73,9 @@ class Curves:
     from_s: float
     to_s: float
     now_s: float | None
+    sds: Float[Array, "n c"] | None = None
+    second: Float[Array, "n c"] | None = None
+    rms_deg: Float[Array, " c"] | None = None
 
 
 def status_of(state: State) -> Status:
@@ -153,13 +163,24 @@ def curves_of(state: State) -> Curves | None:
     if review is not None:
         plots = plots_of(review.setup.layout)
         end = max(review.duration_s, 0.1)
-        return Curves(plots, review.plot_time_s, review.plot_values, 0.0, end, now_s=review.at_s)
+        time_s, values, sds = review.plot_time_s, review.plot_values, review.plot_sds
+        curves = Curves(plots, time_s, values, 0.0, end, review.at_s, _told(sds))
+        second = review.comparison
+        if second is not None:
+            return replace(curves, second=second.values, rms_deg=second.rms_deg)
+        return curves
     if live is None or len(live.time_s) == 0:
         return None
     newest = float(live.time_s[-1])
     start = max(0.0, newest - SPAN_S)
     plots = plots_of(live.setup.layout)
-    return Curves(plots, live.time_s, live.values, start, max(newest, SPAN_S), now_s=None)
+    end = max(newest, SPAN_S)
+    return Curves(plots, live.time_s, live.values, start, end, now_s=None, sds=_told(live.sds))
+
+
+def _told(sds: Float[Array, "n c"]) -> Float[Array, "n c"] | None:
+    """Nothing where no filter tells anything."""
+    return sds if np.isfinite(sds).any() else None
 
 
 def caption_of(state: State) -> str:
@@ -169,7 +190,9 @@ def caption_of(state: State) -> str:
         what = _("Replay · {name} · {subject}").format(
             name=review.take.path.stem, subject=review.take.header.subject
         )
-        return " · ".join(filter(None, [what, _missing(review.setup)]))
+        smooth = _("smoothed") if review.setup.smooth else ""
+        second = comparison_words(review.comparison) if review.comparison is not None else ""
+        return " · ".join(filter(None, [what, smooth, second, _missing(review.setup)]))
     newest = state.newest
     if newest.setup is None or newest.motion is None:
         return _("No hand yet")

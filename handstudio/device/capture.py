@@ -35,6 +35,7 @@ from handstudio.device.orders import (
     Phase,
     Report,
     ResetHeading,
+    SetFilter,
     SetHand,
     SetHeading,
     SetSensors,
@@ -166,7 +167,7 @@ class Capture:
                 return False
             self._follow(order)
 
-    def _follow(self, order: Order) -> None:
+    def _follow(self, order: Order) -> None:  # noqa: PLR0912 - a list
         match order:
             case Connect():
                 self._let_go()
@@ -190,6 +191,8 @@ class Capture:
                 self._learn(replace(self._newly_known, subject=calibration))
             case SetSensors(errors=errors):
                 self._learn(replace(self._newly_known, sensors=errors))
+            case SetFilter(filter=chosen):
+                self._learn(replace(self._newly_known, filter=chosen))
             case SetHeading(headings=headings):
                 self._turn_to(headings)
             case ResetHeading(sensor=sensor):
@@ -484,7 +487,7 @@ class Capture:
         return self._waiting or self._known
 
     def _learn(self, known: Known) -> None:
-        """Use calibrations from now on; a take keeps those that it began with."""
+        """Use calibrations and filter from now on; a take keeps those that it began with."""
         setup = self.newest.setup
         if setup is None:
             self._known = known
@@ -493,12 +496,14 @@ class Capture:
         if self.newest.recorder is not None:
             self._waiting = known
             if other != setup:
-                self._reports.append(_calibration_waits())
+                calibrations = msgspec.structs.replace(other, filter=setup.filter) != setup
+                self._reports.append(_calibration_waits() if calibrations else _filter_waits())
             return
         self._known = known
         if unfit is not None:
             self._reports.append(unfit)
-        if other.sensors != setup.sensors:  # what the filter remembers is of other readings
+        # what a filter remembers is of other readings, or another filter's
+        if (other.sensors, other.filter) != (setup.sensors, setup.filter):
             self._begin_anew(other)
         if other != setup:
             self.newest = replace(self.newest, setup=other)
@@ -594,6 +599,13 @@ def _calibration_waits() -> DeviceError:
     return DeviceError(
         "Another calibration is there: the take keeps the one it began with.",
         "The other one is used once the take is over.",
+    )
+
+
+def _filter_waits() -> DeviceError:
+    return DeviceError(
+        "Another filter was chosen: the take keeps the one it began with.",
+        "The other filter is used once the take is over.",
     )
 
 

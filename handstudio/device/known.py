@@ -1,4 +1,4 @@
-"""What is known of wearer and glove beside what the device says of itself."""
+"""What is known of wearer and glove, and chosen, beside what the device says of itself."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ import msgspec
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import CalibrationError
-from handstudio.setup import Setup, calibrated
+from handstudio.setup import AnyFilter, Setup, calibrated
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Calibrations and headings that the next setup is to have.
+    """Calibrations, headings and the filter that the next setup is to have.
 
     Attributes:
         subject: Of the wearer; None: mean proportions.
         sensors: Of a device's sensors; None: as they were shipped.
         heading_rad: One a sensor; empty: as the sensors say.
+        filter: The one that was chosen; None: the setup's own.
     """
 
     subject: SubjectCalibration | None = None
     sensors: DeviceCalibration | None = None
     heading_rad: tuple[float, ...] = ()
+    filter: AnyFilter | None = None
 
     def on(self, setup: Setup) -> tuple[Setup, CalibrationError | None]:
         """A setup with all of it that fits, and why the wearer's calibration is not in it.
@@ -35,7 +37,11 @@ class Known:
         mine = self.sensors is not None and self.sensors.device == serial
         sensors = self.sensors if mine else None
         fits = len(self.heading_rad) == len(setup.layout.sensors)
-        setup = msgspec.structs.replace(setup, heading_rad=self.heading_rad if fits else ())
+        setup = msgspec.structs.replace(
+            setup,
+            heading_rad=self.heading_rad if fits else (),
+            filter=setup.filter if self.filter is None else self.filter,
+        )
         try:
             return calibrated(setup, subject=self.subject, sensors=sensors), None
         except CalibrationError as error:

@@ -15,7 +15,7 @@ from handstudio.errors import HandstudioError
 from handstudio.health.findings import Finding
 from handstudio.pipeline import Motion
 from handstudio.protocol.packets import Description, Reply
-from handstudio.setup import HandModel, Setup
+from handstudio.setup import AnyFilter, HandModel, Setup
 
 
 class Phase(Enum):
@@ -65,6 +65,16 @@ class SetSensors:
     """The errors of a device's sensors, from now on; None: as they were shipped."""
 
     errors: DeviceCalibration | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetFilter:
+    """The filter, from now on; every sensor waits for its rest anew.
+
+    While a take is recorded it waits for its end, as `SetSubject` does.
+    """
+
+    filter: AnyFilter
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +132,7 @@ Order: TypeAlias = (
     | SetHand
     | SetSubject
     | SetSensors
+    | SetFilter
     | StartTake
     | StopTake
     | Ask

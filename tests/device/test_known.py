@@ -12,9 +12,19 @@ import pytest
 from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.known import Known
-from handstudio.device.orders import ResetHeading, SetHeading, SetSensors, SetSubject
+from handstudio.device.orders import (
+    ResetHeading,
+    SetFilter,
+    SetHeading,
+    SetSensors,
+    SetSubject,
+)
 from handstudio.errors import CalibrationError, DeviceError
+from handstudio.fusion.raw import RawFilter
+from handstudio.fusion.tree_filter import TreeFilter
+from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.setup import NO_CALIBRATION
+from handstudio.warming import warm
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -152,3 +162,37 @@ def test_headings_are_of_the_device_that_they_were_found_on(connected, glove):
 def test_headings_of_so_many_other_sensors_are_left_out(connected):
     setup = connected.newest.setup
     assert Known(heading_rad=(0.1,)).on(setup)[0].heading_rad == ()
+
+
+def test_another_filter_begins_anew_and_calibrations_stay(connected):
+    connected.send(SetSubject(HAND))
+    connected.send(SetFilter(RawFilter()))
+    connected.until(lambda newest: newest.setup.filter == RawFilter(), "it is used")
+    assert connected.newest.setup.subject == HAND
+    connected.until(lambda newest: not newest.motion.doubt.any(), "all were placed anew")
+    connected.send(SetSubject(None))
+    connected.until(lambda newest: newest.setup.subject is None, "the filter was not touched")
+    assert connected.newest.setup.filter == RawFilter()
+    assert not connected.reports
+
+
+def test_a_take_keeps_the_filter_it_began_with_and_the_other_comes_after(connected):
+    connected.start_take()
+    connected.send(SetFilter(RawFilter()))
+    connected.until(lambda _: connected.reports, "it is told")
+    assert "Another filter" in str(connected.reports[0])
+    connected.go_on(30)
+    take = connected.stop_take()
+    assert take.header.setup.filter == VqfFilter()
+    connected.check(take)
+    connected.until(lambda newest: newest.setup.filter == RawFilter(), "it is used")
+
+
+def test_a_take_by_the_whole_hand_filter_gives_the_motion_that_was_shown(connected):
+    warm()
+    connected.send(SetFilter(TreeFilter()))
+    connected.until(lambda newest: newest.setup.filter == TreeFilter(), "it is used")
+    connected.until(lambda newest: np.isfinite(newest.motion.sd_rad).all(), "it tells how sure")
+    connected.start_take()
+    connected.go_on(60)
+    connected.check(connected.stop_take())

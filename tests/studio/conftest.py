@@ -28,6 +28,7 @@ from handstudio.recording.subjects import Subject, create_subject
 from handstudio.recording.take import Take, open_take
 from handstudio.samples import ImuSamples
 from handstudio.settings import SettingsStore
+from handstudio.setup import Setup
 
 TICK_S = 0.016
 
@@ -74,12 +75,15 @@ class PromptJobs:
 
     share_done = 1.0
 
-    def process(self, path: Path) -> Future[None]:
-        return done(lambda: process(open_take(path)))
+    def process(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        return done(lambda: process(open_take(path), setup))
 
-    def export(self, path: Path, target: Path, content: Content, window: Window) -> Future[Path]:
+    def export(
+        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+    ) -> Future[Path]:
         take = open_take(path)
-        motion, setup = process(take), take.header.setup
+        setup = setup or take.header.setup
+        motion = process(take, setup)
         return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
 
 

@@ -30,6 +30,7 @@ def test_it_holds_the_last_seconds_only(review: Review) -> None:
             motion.q_world_sensor,
             motion.q_world_start,
             motion.doubt,
+            motion.sd_rad,
         )
         history = extended(history, review.setup, [later])
     assert history is not None

@@ -1,0 +1,46 @@
+"""The second motion of the open take: its hand and its name. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.comparison import SMOOTHED, Comparison
+from app.state import State
+from app.views.course import GhostView
+from app.views.filters import filter_words
+from app.words import _
+from handstudio.hand.pose import Pose
+from handstudio.hand.skeleton import SEGMENTS
+from handstudio.kinematics import pose_of
+from handstudio.maths import so3
+
+_NONE = np.zeros(len(SEGMENTS), dtype=bool)
+
+
+def choices() -> dict[str, str]:
+    """What can be compared with, by name, in words; the empty name: nothing."""
+    return {"": _("Nothing"), **filter_words(), SMOOTHED: _("Smoothed take")}
+
+
+def compared_ghost(state: State) -> GhostView | None:
+    """The second hand, pale and in the place of the first; None: there is none."""
+    review = state.review
+    if review is None or review.comparison is None or review.comparison.fit is None:
+        return None
+    second, fit = review.comparison, review.comparison.fit
+    pose = pose_of(second.setup, second.at(float(review.time_s[review.index])).q_world_sensor, fit)
+    return GhostView(fit.skeleton, _turned(pose, state.yaw or 0.0), _NONE, "", beside=False)
+
+
+def comparison_words(comparison: Comparison) -> str:
+    """What is pale in the picture and dashed in the plots."""
+    return _("pale and dashed: {name}").format(name=choices()[comparison.name])
+
+
+def _turned(pose: Pose, yaw: float) -> Pose:
+    turn = so3.about_z(yaw)
+    return Pose(
+        so3.multiply(turn, pose.q_world_segment[0]),
+        so3.rotate(turn, pose.t_world_joint[0]),
+        so3.rotate(turn, pose.t_world_tip[0]),
+    )
