@@ -50,6 +50,6 @@ def _why(doubt: int, sd_deg: float) -> str:
         return _("waits for half a second of rest")
     if doubt & Doubt.SATURATED:
         return _("at its limit")
-    if UNSURE_DEG < sd_deg < np.inf:
+    if UNSURE_DEG < round(sd_deg, 1) < np.inf:
         return _("standard deviation {sd:.1f}°").format(sd=sd_deg)
     return ""
