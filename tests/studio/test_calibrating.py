@@ -273,7 +273,7 @@ def test_the_take_that_ends_beneath_it_stops_the_course_and_nothing_else(guided:
 
 def test_a_take_that_never_begins_is_noticed(guided: Guided) -> None:
     after(guided.studio, intents.BeginCourse("hand"))
-    for _ in range(8):
+    for _ in range(20):
         state = guided.studio.tick(1.0)
     assert state.guided is not None
     assert state.guided.problem is not None
