@@ -20,7 +20,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
 from handstudio.calibration.rest import REST_S, Rest, first_rest
 from handstudio.errors import SetupError
-from handstudio.fusion.filter import ALIGNED_SD, COMPASS_SD, UNKNOWN_SD, Fused, WholeFilter
+from handstudio.fusion.filter import ALIGNED_SD, COMPASS_SD, UNKNOWN_SD, Fused, sees_all
 from handstudio.hand_fit import mechanism_of
 from handstudio.maths import so3
 from handstudio.samples import Event, Gap, ImuSamples, Why
@@ -143,7 +143,7 @@ def turned(setup: Setup, motion: Motion) -> Motion:
 
     A filter that sees the sensors together has them so already.
     """
-    if not setup.heading_rad or isinstance(setup.filter, WholeFilter):
+    if not setup.heading_rad or sees_all(setup.filter):
         return motion
     return with_headings(setup, motion)
 
@@ -161,7 +161,7 @@ def with_headings(setup: Setup, motion: Motion) -> Motion:
 
 def reheaded(before: Setup, after: Setup, state: State) -> State:
     """What a state becomes where nothing but the setup's headings changes."""
-    if not isinstance(after.filter, WholeFilter):
+    if not sees_all(after.filter):
         return state
     sensors = len(after.layout.sensors)
     none = (0.0,) * sensors
@@ -256,7 +256,7 @@ def _place(setup: Setup, state: State, sensor: int, rest: Rest) -> State:
     placed, attitude = state.placed.copy(), rest.q_world_sensor
     placed[sensor] = True
     fused: Any
-    if not isinstance(setup.filter, WholeFilter):
+    if not sees_all(setup.filter):
         fused = setup.filter.place(state.filter, sensor, attitude, rest.gyr_bias)
     else:
         heading_sd = COMPASS_SD if rest.compass else UNKNOWN_SD
@@ -276,7 +276,7 @@ def _fuse(
     if len(samples) == 0:
         return state
     given = (state.filter, samples, stretch, samples.valid, mechanism_of(setup))
-    if isinstance(setup.filter, WholeFilter):
+    if sees_all(setup.filter):
         result: Fused[Any] = setup.filter.fused(*given)
     else:
         orientation, after = setup.filter.run(*given)

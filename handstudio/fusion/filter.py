@@ -8,7 +8,8 @@ magnetic field.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from functools import cache
+from typing import Any, Generic, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -142,3 +143,13 @@ class Fused(Generic[State]):
     q_world_sensor: Float[Array, "n s 4"]
     sd_rad: Float[Array, "n s 2"]
     state: State
+
+
+def sees_all(filter: Filter[Any]) -> TypeGuard[WholeFilter[Any]]:
+    """Whether a filter is one over all sensors together."""
+    return _is_whole(type(filter))
+
+
+@cache  # to look through a protocol costs as much as to fuse a sample
+def _is_whole(kind: type) -> bool:
+    return issubclass(kind, WholeFilter)
