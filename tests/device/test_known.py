@@ -188,6 +188,7 @@ def test_a_take_keeps_the_filter_it_began_with_and_the_other_comes_after(connect
     connected.until(lambda newest: newest.setup.filter == RawFilter(), "it is used")
 
 
+@pytest.mark.long
 def test_a_take_by_the_whole_hand_filter_gives_the_motion_that_was_shown(connected):
     warm()
     connected.send(SetFilter(TreeFilter()))
