@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
-from handstudio.fusion.filter import Fused
+from handstudio.fusion.filter import ALIGNED_SD, Fused
 from handstudio.fusion.mechanism import Mechanism
 from handstudio.fusion.tree_filter import Tape, TreeFilter, TreeState
 from handstudio.samples import ImuSamples
@@ -50,8 +50,35 @@ class Taping:
     def __init__(self, filter: TreeFilter) -> None:
         self._filter = filter
         self.stretches: list[Stretch | None] = []
-        self.begin, self.place = filter.begin, filter.place
-        self.turned, self.pack, self.unpack = filter.turned, filter.pack, filter.unpack
+
+    def begin(
+        self, sensors: int, rate_hz: float, magnetometer_rate_hz: float | None = None
+    ) -> TreeState:
+        """As the filter."""
+        return self._filter.begin(sensors, rate_hz, magnetometer_rate_hz)
+
+    def place(
+        self,
+        state: TreeState,
+        sensor: int,
+        q_world_sensor: Float[Array, " 4"],
+        gyr_bias: Float[Array, " 3"],
+        heading_sd_rad: float = ALIGNED_SD,
+    ) -> TreeState:
+        """As the filter."""
+        return self._filter.place(state, sensor, q_world_sensor, gyr_bias, heading_sd_rad)
+
+    def turned(self, state: TreeState, turns: Float[Array, "s 4"]) -> TreeState:
+        """As the filter."""
+        return self._filter.turned(state, turns)
+
+    def pack(self, state: TreeState) -> bytes:
+        """As the filter."""
+        return self._filter.pack(state)
+
+    def unpack(self, packed: bytes) -> TreeState:
+        """As the filter."""
+        return self._filter.unpack(packed)
 
     def restart(self, state: TreeState) -> TreeState:
         """As the filter does; nothing is carried back over it."""
