@@ -509,7 +509,7 @@ class Capture:
             self.newest = replace(self.newest, setup=other)
 
     def _turn_to(self, headings: tuple[float, ...]) -> None:
-        """Headings decide nothing the pipeline remembers: its state goes on."""
+        """The pipeline's state goes on, turned where its filter has all sensors in one world."""
         setup = self.newest.setup
         if self.newest.recorder is not None:
             self._reports.append(_heading_stays())

@@ -13,6 +13,7 @@ change, and what comes out is carried on to the newest by the gyroscopes.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Literal
 
 import msgspec
@@ -347,6 +348,7 @@ def _array(got: _Packed, name: str) -> Array:
     return np.frombuffer(got.arrays[name]).reshape(shape).copy()
 
 
+@lru_cache(maxsize=16)  # asked for with every chunk of a stream
 def _as_arrays(mechanism: Mechanism) -> Joints:
     """What the kernel is told of the joints: their axes in both sensors."""
     x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
