@@ -42,15 +42,22 @@ def matrix(q, m):
 
 @njit
 @no_type_check
-def turned_before(q, x, y, z):
-    """Turn a quaternion by a rotation vector in the world, in place: exp(v) q."""
+def _exp(x, y, z):
+    """Quaternion of a rotation vector, in parts."""
     angle2 = x * x + y * y + z * z
     if angle2 < 1e-8:
         c, s = 1.0 - angle2 / 8.0, 0.5 - angle2 / 48.0
     else:
         angle = np.sqrt(angle2)
         c, s = np.cos(0.5 * angle), np.sin(0.5 * angle) / angle
-    a, b, d = s * x, s * y, s * z
+    return c, s * x, s * y, s * z
+
+
+@njit
+@no_type_check
+def turned_before(q, x, y, z):
+    """Turn a quaternion by a rotation vector in the world, in place: exp(v) q."""
+    c, a, b, d = _exp(x, y, z)
     w, i, j, k = q[0], q[1], q[2], q[3]
     q[0] = c * w - a * i - b * j - d * k
     q[1] = c * i + a * w + b * k - d * j
@@ -62,13 +69,7 @@ def turned_before(q, x, y, z):
 @no_type_check
 def turned_after(q, x, y, z):
     """Turn a quaternion by a rotation vector in its own frame, in place: q exp(v), unit again."""
-    angle2 = x * x + y * y + z * z
-    if angle2 < 1e-8:
-        c, s = 1.0 - angle2 / 8.0, 0.5 - angle2 / 48.0
-    else:
-        angle = np.sqrt(angle2)
-        c, s = np.cos(0.5 * angle), np.sin(0.5 * angle) / angle
-    a, b, d = s * x, s * y, s * z
+    c, a, b, d = _exp(x, y, z)
     w, i, j, k = q[0], q[1], q[2], q[3]
     q[0] = w * c - i * a - j * b - k * d
     q[1] = i * c + w * a + j * d - k * b

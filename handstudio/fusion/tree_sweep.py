@@ -14,7 +14,7 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
-from handstudio.fusion.tree_small import inverse3, rotated
+from handstudio.fusion.tree_small import inverse3, rotated, times_by_rows
 
 
 @njit
@@ -52,13 +52,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                     t[i, j] = inverse[c, i, j] + info[c, i, j]
             inverse3(t, given[c])
             continue
-        for i in range(3):
-            for j in range(3):
-                follow[c, i, j] = (
-                    edge[c, i, 0] * inverse[p, 0, j]
-                    + edge[c, i, 1] * inverse[p, 1, j]
-                    + edge[c, i, 2] * inverse[p, 2, j]
-                )
+        times_by_rows(edge[c], inverse[p], follow[c])
         for i in range(3):
             for j in range(i, 3):
                 v = cov[c, i, j] - (
@@ -116,12 +110,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
             continue
         for i in range(3):
             x[c, i] += gain[c, i, 0] * x[p, 0] + gain[c, i, 1] * x[p, 1] + gain[c, i, 2] * x[p, 2]
-            for j in range(3):
-                edge[c, i, j] = (
-                    gain[c, i, 0] * cov[p, 0, j]
-                    + gain[c, i, 1] * cov[p, 1, j]
-                    + gain[c, i, 2] * cov[p, 2, j]
-                )
+        times_by_rows(gain[c], cov[p], edge[c])
         for i in range(3):
             for j in range(i, 3):
                 v = given[c, i, j] + (
