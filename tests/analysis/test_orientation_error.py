@@ -151,7 +151,7 @@ def test_vqf_errs_on_broad_as_its_package_does_through_import_take_and_process(
 ) -> None:
     trials = {
         name: broad_trial(
-            imported(data_dir / "broad" / f"{name}.mat", broad_folder, tmp_path, "BROAD")
+            imported(data_dir / "broad" / f"{name}.mat", broad_folder, tmp_path, "BROAD", "vqf")
         )
         for name in VQF_ON_BROAD
     }
@@ -165,7 +165,7 @@ def test_between_two_segments_inclination_alone_costs_under_two_degrees(
     data_dir: Path, tmp_path: Path
 ) -> None:
     trials = {
-        path.stem: dfjimu_trial(imported(path, dfjimu_folder, tmp_path, "dfjimu"))
+        path.stem: dfjimu_trial(imported(path, dfjimu_folder, tmp_path, "dfjimu", "vqf"), path)
         for path in sorted((data_dir / "dfjimu").glob("*.mat"))
     }
     assert len(trials) == 10

@@ -71,7 +71,7 @@ def small_disk(place: Path, size: str) -> Iterator[None]:
 
 
 def test_a_file_that_may_grow_no_more_ends_the_take_not_the_stream(studio, glove):
-    studio.connect(glove(seed=71, rate=1000).address)
+    studio.connect(glove(seed=71, rate=200).address)
     with limit_of_file_size(150_000):
         path = studio.start_take()
         report = failed(studio)
@@ -87,9 +87,9 @@ def test_a_file_that_may_grow_no_more_ends_the_take_not_the_stream(studio, glove
 
 
 def test_a_full_disk_ends_the_take_not_the_stream(studio, glove, tmp_path):
-    studio.connect(glove(seed=72, rate=1000).address)
+    studio.connect(glove(seed=72, rate=200).address)
     disk = tmp_path / "stick"
-    with small_disk(disk, "500k"):
+    with small_disk(disk, "250k"):
         path = disk / "take.mcap"
         studio.send(StartTake(path, "S01"))
         report = failed(studio)
@@ -103,7 +103,7 @@ def test_a_full_disk_ends_the_take_not_the_stream(studio, glove, tmp_path):
 
 def test_a_full_disk_for_the_motion_alone_costs_the_take_nothing(studio, glove, monkeypatch):
     """At 20 sensors a motion is twice as large as the bytes it is made of."""
-    studio.connect(glove(seed=73, rate=1000).address)
+    studio.connect(glove(seed=73, rate=200).address)
     with limit_of_file_size(200_000):
         studio.start_take()
         studio.go_on(400)
