@@ -72,6 +72,10 @@ class Taping:
         """As the filter."""
         return self._filter.turned(state, turns)
 
+    def rejoined(self, state: TreeState) -> TreeState:
+        """As the filter."""
+        return self._filter.rejoined(state)
+
     def pack(self, state: TreeState) -> bytes:
         """As the filter."""
         return self._filter.pack(state)
