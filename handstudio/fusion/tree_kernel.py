@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import no_type_check
 
 import numpy as np
@@ -20,6 +19,7 @@ from handstudio.fusion.tree_observe import observe
 from handstudio.fusion.tree_parts import HEEDED, ODD, PLACED, Work
 from handstudio.fusion.tree_propagate import apart, began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
+from handstudio.fusion.tree_stamp import stamp
 from handstudio.fusion.tree_sweep import spread_of, swept
 
 
@@ -83,23 +83,8 @@ def _remember(st, gyr, acc, mag, flags):
         st.past[s, 1] = flags[s]
 
 
-def _stamp() -> int:
-    """A number that changes with any of the code that is compiled into the loop."""
-    known = (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
-    code = [
-        (kernel.py_func.__code__.co_code, repr(kernel.py_func.__code__.co_consts))
-        for names in (*map(vars, known), globals())
-        for kernel in names.values()
-        if hasattr(kernel, "py_func")
-    ]
-    constants = [
-        repr((k, v)) for names in map(vars, known) for k, v in names.items() if k.isupper()
-    ]
-    return zlib.crc32(repr((code, constants)).encode()) | 1
-
-
 @no_type_check
-def _compiled(stamp):
+def _compiled(known_by):
     """The loop. It alone is kept on disk, under the stamp: it is never older than its source."""
 
     @njit(cache=True)
@@ -118,7 +103,7 @@ def _compiled(stamp):
             sd: And how sure they are (n, s, 2).
             tape: What a smoother needs, where there is room for it.
         """
-        assert stamp != 0
+        assert known_by != 0
         after, sure, follow, spreads = tape
         n, taped = len(m.order), len(after) > 0
         w = Work(
@@ -166,4 +151,6 @@ def _compiled(stamp):
     return run
 
 
-run = _compiled(_stamp())
+_PARTS = (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
+
+run = _compiled(stamp(*map(vars, _PARTS), globals()))

@@ -61,7 +61,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                     + follow[c, i, 2] * edge[c, j, 2]
                 )
                 t[i, j] = t[j, i] = v
-        if not _is_positive(t):  # rounding, or a model that is wrong: better to know less
+        if not is_positive(t):  # rounding, or a model that is wrong: better to know less
             edge[c], follow[c] = 0.0, 0.0
             t[:] = cov[c]
         inverse3(t, sure[c])
@@ -123,7 +123,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
 
 @njit
 @no_type_check
-def _is_positive(a):
+def is_positive(a):
     """Whether a symmetric 3 x 3 is a covariance."""
     two = a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]
     c02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
