@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import BinaryIO, Literal, TypeAlias
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
@@ -105,6 +103,9 @@ class _Table:
 
 
 def _write(file: BinaryIO, table: _Table, motion: Motion, start_us: int) -> None:
+    import pyarrow as pa  # noqa: PLC0415 - takes a while to load
+    import pyarrow.csv  # noqa: PLC0415
+
     options = pa.csv.WriteOptions(include_header=True, quoting_style="none")
     names = ["time_s", *table.names, "doubtful_sensors"]
     schema = pa.schema([(name, pa.float64()) for name in names])
