@@ -10,7 +10,7 @@ from numba import njit
 from handstudio.fusion import tree_earlier, tree_small, tree_sweep
 from handstudio.fusion.tree_earlier import earlier, spread_before
 from handstudio.fusion.tree_stamp import stamp
-from handstudio.fusion.tree_sweep import spread_of
+from handstudio.fusion.tree_sweep import worst_of
 
 
 @no_type_check
@@ -49,8 +49,8 @@ def _compiled(known_by):
             earlier(parent, sure[k + 1], follow[k + 1], added[k], cov, edge, work)
             for s in range(sensors):
                 p = parent[s]
-                sd[k - 1, s, 0] = np.sqrt(spread_of(p, s, False, cov, edge) / 3.0)
-                sd[k - 1, s, 1] = np.sqrt(spread_of(p, s, p >= 0, cov, edge) / 3.0)
+                sd[k - 1, s, 0] = np.sqrt(worst_of(p, s, False, cov, edge))
+                sd[k - 1, s, 1] = np.sqrt(worst_of(p, s, p >= 0, cov, edge))
 
     return backward
 

@@ -20,7 +20,7 @@ from handstudio.fusion.tree_parts import HEEDED, ODD, PLACED, Work
 from handstudio.fusion.tree_propagate import apart, began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
 from handstudio.fusion.tree_stamp import stamp
-from handstudio.fusion.tree_sweep import spread_of, swept
+from handstudio.fusion.tree_sweep import swept, worst_of
 
 
 @njit
@@ -140,10 +140,9 @@ def _compiled(known_by):
             _remember(st, gyr[k], acc[k], mag[k], flags[k])
             for s in range(n):
                 out[k, s] = st.q[s]
-                own = st.cov[s, 0, 0] + st.cov[s, 1, 1] + st.cov[s, 2, 2]
-                sd[k, s, 0] = np.sqrt(own / 3.0)
                 p = m.parent[s]
-                sd[k, s, 1] = np.sqrt(spread_of(p, s, p >= 0, st.cov, st.edge) / 3.0)
+                sd[k, s, 0] = np.sqrt(worst_of(p, s, False, st.cov, st.edge))
+                sd[k, s, 1] = np.sqrt(worst_of(p, s, p >= 0, st.cov, st.edge))
             st.scalar[0], st.scalar[1] = dt[k], 1.0
             if taped:
                 spreads[k] = added

@@ -30,6 +30,19 @@ def spread_of(p, c, has_parent, cov, own):
 
 @njit
 @no_type_check
+def worst_of(p, c, has_parent, cov, own):
+    """Of the same the largest variance about one axis of the world."""
+    worst = 0.0
+    for i in range(3):
+        v = cov[c, i, i]
+        if has_parent:
+            v += cov[p, i, i] - 2.0 * own[c, i, i]
+        worst = max(worst, v)
+    return worst
+
+
+@njit
+@no_type_check
 def swept(order, parent, cov, edge, info, pull, cross, work, x):
     """One sweep towards the root and one back: new covariances, and the errors' means in x.
 

@@ -41,13 +41,13 @@ def nearest_tree(cov: Array) -> Array:
 
 
 def expected_sd(cov: Array) -> Array:
-    """Of each sensor, and relative to its parent."""
+    """Of each sensor, and relative to its parent, about the axis that is known least."""
     out = np.zeros((SENSORS, 2))
     for s, p in enumerate(PARENT):
         own = relative = block(cov, s, s)
         if p >= 0:
             relative = own + block(cov, p, p) - block(cov, s, p) - block(cov, p, s)
-        out[s] = np.sqrt([np.trace(own) / 3.0, np.trace(relative) / 3.0])
+        out[s] = np.sqrt([np.diag(own).max(), np.diag(relative).max()])
     return out
 
 

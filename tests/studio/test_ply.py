@@ -32,5 +32,5 @@ def test_every_mesh_is_read_as_its_maker_reads_it(path):
     ids=["cut", "ascii", "other faces", "a quadrangle"],
 )
 def test_what_is_no_such_file_is_told(damage):
-    with pytest.raises(ValueError, match="not|bytes"):
+    with pytest.raises(ValueError, match=r"not|bytes"):
         read_ply(damage(MESHES[0].read_bytes()))
