@@ -46,20 +46,12 @@ class HandFit:
 def fit_of(setup: Setup) -> HandFit:
     """The hand a setup describes: the calibrated one, else mean proportions of its length.
 
+    Kept for the setups asked about last: a page asks for every picture.
+
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    if not setup.layout.is_hand:
-        raise LayoutError(
-            "There is no hand in this recording.",
-            "{why} {why.remedy}",
-            why=setup.layout.no_hand,
-        )
-    if setup.subject is not None:
-        return fit_of_calibration(setup.subject, setup.layout)
-    side: HandSide = "left" if setup.layout.side == "left" else "right"
-    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
-    return HandFit(skeleton, nominal_mounting(setup.layout))
+    return _fit(_Same(setup))
 
 
 def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandFit:
@@ -120,6 +112,22 @@ class _Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and other.setup is self.setup
+
+
+@lru_cache(maxsize=16)
+def _fit(same: _Same) -> HandFit:
+    setup = same.setup
+    if not setup.layout.is_hand:
+        raise LayoutError(
+            "There is no hand in this recording.",
+            "{why} {why.remedy}",
+            why=setup.layout.no_hand,
+        )
+    if setup.subject is not None:
+        return fit_of_calibration(setup.subject, setup.layout)
+    side: HandSide = "left" if setup.layout.side == "left" else "right"
+    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
+    return HandFit(skeleton, nominal_mounting(setup.layout))
 
 
 @lru_cache(maxsize=16)
