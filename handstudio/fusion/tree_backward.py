@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
 from handstudio.fusion import tree_earlier, tree_small, tree_sweep
+from handstudio.fusion.tree_compiled import compiled, kept, stamp
 from handstudio.fusion.tree_earlier import earlier, spread_before
-from handstudio.fusion.tree_stamp import stamp
 from handstudio.fusion.tree_sweep import worst_of
 
 
@@ -17,7 +16,7 @@ from handstudio.fusion.tree_sweep import worst_of
 def _compiled(known_by):
     """The loop. It alone is kept on disk, under the stamp: it is never older than its source."""
 
-    @njit(cache=True)
+    @kept
     @no_type_check
     def backward(order, parent, out, after, sure, follow, added, result, sd):
         """Smooth in place; see `tree_smoother`. The last two instants stay as they are.
@@ -55,7 +54,7 @@ def _compiled(known_by):
     return backward
 
 
-@njit
+@compiled
 @no_type_check
 def _pull(parent, sure, follow, d, pulled):
     """Product of the inverse covariance before correction with errors d, into pulled."""
@@ -79,7 +78,7 @@ def _pull(parent, sure, follow, d, pulled):
                     pulled[p, i] -= follow[s, j, i] * u[j]
 
 
-@njit
+@compiled
 @no_type_check
 def _between(q, p, s, d):
     """Rotation vector in the world from p to q: ``log(q conj(p))``."""
@@ -96,7 +95,7 @@ def _between(q, p, s, d):
     d[s, 0], d[s, 1], d[s, 2] = scale * r1, scale * r2, scale * r3
 
 
-@njit
+@compiled
 @no_type_check
 def _turned(q, v, out):
     """``exp(v) q``, into out."""

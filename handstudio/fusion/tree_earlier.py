@@ -14,14 +14,14 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_parts import TINY
 from handstudio.fusion.tree_small import inverse3, times_by_rows
 from handstudio.fusion.tree_sweep import is_positive
 
 
-@njit
+@compiled
 @no_type_check
 def spread_before(order, parent, sure, follow, cov, edge):
     """Covariances of a tree whose sensors follow their parents, into cov and edge."""
@@ -39,7 +39,7 @@ def spread_before(order, parent, sure, follow, cov, edge):
                 cov[s, i, j] += t[i, j]
 
 
-@njit
+@compiled
 @no_type_check
 def earlier(parent, sure, follow, added, cov, edge, work):
     """One instant back, in place.
@@ -99,7 +99,7 @@ def earlier(parent, sure, follow, added, cov, edge, work):
             cov[s] = t
 
 
-@njit
+@compiled
 @no_type_check
 def _precision(parent, sure, follow, own, link):
     """Inverse of the covariance of all: a sensor's own block, and minus that with its parent."""
@@ -117,7 +117,7 @@ def _precision(parent, sure, follow, own, link):
                     own[p, i, j] += t[i, k] * link[s, k, j]
 
 
-@njit
+@compiled
 @no_type_check
 def _edge(s, p, added, cov, edge, parts, room):
     """Covariance of a sensor with its parent one instant back, into the room of ``up``."""
@@ -145,7 +145,7 @@ def _edge(s, p, added, cov, edge, parts, room):
             up[s, i, j] = down[s, i, j] + t[i, j] + both * link[s, i, j]
 
 
-@njit
+@compiled
 @no_type_check
 def _rest(cov, edge, by, out):
     """What is left of a covariance where a neighbour is known: ``cov - by edge'``."""
@@ -155,7 +155,7 @@ def _rest(cov, edge, by, out):
             out[i, j] = cov[i, j] - out[i, j]
 
 
-@njit
+@compiled
 @no_type_check
 def _times_turned(a, b, out):
     """Matrix product ``a b'``, into out."""
@@ -164,7 +164,7 @@ def _times_turned(a, b, out):
             out[i, j] = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
 
 
-@njit
+@compiled
 @no_type_check
 def _turn_over(a, out, by):
     """``by a'``, into out."""
@@ -173,7 +173,7 @@ def _turn_over(a, out, by):
             out[i, j] = by * a[j, i]
 
 
-@njit
+@compiled
 @no_type_check
 def _around(a, b, out):
     """Add ``a b a'`` to out."""
@@ -185,7 +185,7 @@ def _around(a, b, out):
             out[i, j] += r0 * a[j, 0] + r1 * a[j, 1] + r2 * a[j, 2]
 
 
-@njit
+@compiled
 @no_type_check
 def _around_to(a, b, more, out):
     """``a b a' + more``, made symmetric, into out."""

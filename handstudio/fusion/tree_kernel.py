@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
 from handstudio.fusion import (
     tree_learn,
@@ -14,16 +13,16 @@ from handstudio.fusion import (
     tree_small,
     tree_sweep,
 )
+from handstudio.fusion.tree_compiled import compiled, kept, stamp
 from handstudio.fusion.tree_learn import learn, rested
 from handstudio.fusion.tree_observe import observe
 from handstudio.fusion.tree_parts import HEEDED, ODD, PLACED, Work
 from handstudio.fusion.tree_propagate import apart, began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
-from handstudio.fusion.tree_stamp import stamp
 from handstudio.fusion.tree_sweep import swept, worst_of
 
 
-@njit
+@compiled
 @no_type_check
 def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
     """Correct the instant before by its own readings; the new rates tell how its rates changed."""
@@ -54,7 +53,7 @@ def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
             rested(beliefs, s, st, period)
 
 
-@njit
+@compiled
 @no_type_check
 def _turn_mean(mean, x, at):
     """What was averaged was seen in the orientation that is corrected now."""
@@ -64,7 +63,7 @@ def _turn_mean(mean, x, at):
     mean[at + 2] += x[0] * b - x[1] * a
 
 
-@njit
+@compiled
 @no_type_check
 def _remember(st, gyr, acc, mag, flags):
     for s in range(len(flags)):
@@ -87,7 +86,7 @@ def _remember(st, gyr, acc, mag, flags):
 def _compiled(known_by):
     """The loop. It alone is kept on disk, under the stamp: it is never older than its source."""
 
-    @njit(cache=True)
+    @kept
     @no_type_check
     def run(beliefs, m, st, gyr, acc, mag, flags, dt, out, sd, tape):
         """Fuse consecutive instants; the memory ``st`` is changed in place.

@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_small import inverse3, rotated, times_by_rows
 
 
-@njit
+@compiled
 @no_type_check
 def spread_of(p, c, has_parent, cov, own):
     """Sum of the variances of a relative (or, without parent, of its own) orientation."""
@@ -28,7 +28,7 @@ def spread_of(p, c, has_parent, cov, own):
     return max(total, 0.0)
 
 
-@njit
+@compiled
 @no_type_check
 def worst_of(p, c, has_parent, cov, own):
     """Of the same the largest variance about one axis of the world."""
@@ -41,7 +41,7 @@ def worst_of(p, c, has_parent, cov, own):
     return worst
 
 
-@njit
+@compiled
 @no_type_check
 def swept(order, parent, cov, edge, info, pull, cross, work, x):
     """One sweep towards the root and one back: new covariances, and the errors' means in x.
@@ -134,7 +134,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                 cov[c, i, j] = cov[c, j, i] = v
 
 
-@njit
+@compiled
 @no_type_check
 def is_positive(a):
     """Whether a symmetric 3 x 3 is a covariance."""

@@ -1,13 +1,20 @@
-"""A number that changes with compiled code: what is kept on disk must not be older than its source.
-
-numba looks at the file of the function that is kept, not at those of the ones it calls.
-"""
+"""How the tree filter's loops are compiled, and a number that changes with their code."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
 from typing import Any
+
+from numba import njit
+
+compiled = njit(error_model="numpy")
+"""A division by zero is infinite, as in numpy: with a way out of every function at every division a
+step takes twice as long, for the same digits."""
+
+kept = njit(cache=True, error_model="numpy")
+"""And kept on disk. numba looks at the file of the function that is kept, not at those of the ones
+it calls: it has to know a `stamp`."""
 
 
 def stamp(*namespaces: Mapping[str, Any]) -> int:
