@@ -32,6 +32,7 @@ from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
 from app.workshop import (
+    Added,
     Computed,
     Exported,
     Gathered,
@@ -196,6 +197,11 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.AddTake(name=name, content=content):
+                self._workshop.add(name, content, self.state.sessions)
+            case intents.ShareTake(page=page):
+                if self.state.review is not None:
+                    self._workshop.share(self.state.review.take, page)
             case intents.TrimTake(name=name):
                 self._trim(name)
             case intents.Smooth(on=on):
@@ -684,10 +690,13 @@ class Studio:
             _("Recorded {name}. Replay it below, export it under Review.").format(name=path.stem)
         )
         if self.state.newest.recorder is None:
-            try:
-                self._open(path)
-            except HandstudioError as error:
-                self._say(error)
+            self._open_or_say(path)
+
+    def _open_or_say(self, path: Path) -> None:
+        try:
+            self._open(path)
+        except HandstudioError as error:
+            self._say(error)
 
     def _finish_work(self) -> None:  # noqa: PLR0912 - a list
         for outcome in self._workshop.done():
@@ -702,6 +711,10 @@ class Studio:
                     self._ask_of_review()
                 case Previewed(take=take, motion=motion) if self.state.review is None:
                     self._show_head(take, motion)
+                case Added(path=path):
+                    self._tell(_("Added {name}.").format(name=path.stem))
+                    self.refresh_takes()
+                    self._open_or_say(path)
                 case Trimmed(path=path):
                     self._tell(_("Trimmed: {name} is a take of its own.").format(name=path.stem))
                     self.refresh_takes()

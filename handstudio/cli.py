@@ -19,7 +19,7 @@ import numpy as np
 import tyro
 
 from handstudio.commands import calibration as calibration_commands
-from handstudio.commands import keeping
+from handstudio.commands import keeping, sharing
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
@@ -353,6 +353,9 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "noise": noise,
     "takes": keeping.takes,
     "rename": keeping.rename,
+    "trim": sharing.trim,
+    "share": sharing.share,
+    "add": sharing.add,
     "bin": keeping.bin,
     "restore": keeping.restore,
     "subjects": keeping.subjects,
