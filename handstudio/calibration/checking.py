@@ -16,7 +16,7 @@ from handstudio.calibration.heard import ROOT
 from handstudio.calibration.subject import Segment, SubjectCalibration
 from handstudio.calibration.swings import Swing, Swings
 from handstudio.calibration.verdict import Reading, Verdict
-from handstudio.hand.skeleton import JOINTS, PARENTS, SEGMENTS
+from handstudio.hand.skeleton import JOINTS, PARENTS, SEGMENTS, ULNAR
 from handstudio.maths import so3
 
 LIMIT_DEG = 7.0
@@ -66,7 +66,10 @@ def lying_off(swings: Swings, calibration: SubjectCalibration) -> dict[str, floa
     """By how much [rad] each segment lies otherwise in the one before it, the hand being flat."""
     known = {segment.name: segment for segment in calibration.segments}
     out = {}
-    for index, parent in enumerate(PARENTS):
+    # a rigid palm is one block, with one frame
+    shared = {SEGMENTS.index(ULNAR): SEGMENTS.index("hand")} if calibration.hand_type == 1 else {}
+    for index, above in enumerate(PARENTS):
+        parent = shared.get(above, above)
         if parent < 0:
             continue
         pair = [known.get(SEGMENTS[k]) for k in (parent, index)]
