@@ -64,6 +64,12 @@ def check(
 
 def lying_off(swings: Swings, calibration: SubjectCalibration) -> dict[str, float]:
     """By how much [rad] each segment lies otherwise in the one before it, the hand being flat."""
+    turns = lying_turns(swings, calibration)
+    return {segment: float(np.linalg.norm(turn)) for segment, turn in turns.items()}
+
+
+def lying_turns(swings: Swings, calibration: SubjectCalibration) -> dict[str, Array]:
+    """The same as rotation vectors [rad], in the segments' frames."""
     known = {segment.name: segment for segment in calibration.segments}
     out = {}
     # a rigid palm is one block, with one frame
@@ -76,8 +82,8 @@ def lying_off(swings: Swings, calibration: SubjectCalibration) -> dict[str, floa
         base, mine = (None if one is None else _attitude(swings, one) for one in pair)
         if base is not None and mine is not None and pair[1] is not None:
             now = so3.multiply(so3.conjugate(base), mine)
-            off = so3.angle_between(np.array(pair[1].q_parent_rest), now)
-            out[SEGMENTS[index]] = float(off)
+            then = np.array(pair[1].q_parent_rest)
+            out[SEGMENTS[index]] = so3.log(so3.multiply(so3.conjugate(then), now))
     return out
 
 
