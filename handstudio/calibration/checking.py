@@ -19,10 +19,10 @@ from handstudio.calibration.verdict import Reading, Verdict
 from handstudio.hand.skeleton import JOINTS, PARENTS, SEGMENTS, ULNAR
 from handstudio.maths import so3
 
-LIMIT_DEG = 7.0
-"""How far a segment may have moved. The same glove, left on, seems to move by five degrees at
-most (virtual people 101 to 103, who are not apart from those reported on); put on again, some
-segment of it by twenty."""
+LIMIT_DEG = 6.5
+"""How far a segment may have moved. Of checks with the glove left on 98 % stay below at every
+segment: virtual people 1 to 4, who bend each joint by 1.5 degrees (ours) otherwise from one flat
+hand to the next (`benchmarks.calibration --development`, its ``check``)."""
 
 LIMIT_UNCALIBRATED_DEG = 11.0
 """The same of sensors whose own errors are not known: there it seems to move by nine."""
