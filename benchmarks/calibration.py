@@ -25,6 +25,7 @@ from benchmarks import heading, rig, sensor_errors, sloppy
 from benchmarks.calibrated import Asked, Errors, run
 from benchmarks.checked import figures
 from handstudio.calibration.checking import LIMIT_DEG, LIMIT_UNCALIBRATED_DEG
+from handstudio.hand.skeleton import HandType
 from handstudio.recording.material import RECORDINGS
 from handstudio.shell import out, print_table, progress
 from handstudio.simulation.imperfections.strengths import parse
@@ -56,6 +57,7 @@ def main(
     others: bool = True,
     check: bool = True,
     sensors_first: bool = True,
+    hand_type: HandType = 3,
 ) -> None:
     """Measure.
 
@@ -68,15 +70,20 @@ def main(
         others: Run the benchmarks of headings, sensors, sloppy courses and the real rig too.
         check: See whether a check lets each calibration pass, and notices boards that slipped.
         sensors_first: Calibrate the sensors before.
+        hand_type: How the palm is divided.
     """
     people = (DEVELOPMENT if development else REPORTING)[:subjects]
     seeds = 0 if development else 10_000
-    asked = [Asked(n, seeds + n, parse(imperfections), sensors_first, check=check) for n in people]
+    asked = [
+        Asked(n, seeds + n, parse(imperfections), sensors_first, check=check, hand_type=hand_type)
+        for n in people
+    ]
     found: dict[str, Any] = {
         "imperfections": imperfections,
         "subjects": list(people),
         "development": development,
         "sensors_first": sensors_first,
+        "hand_type": hand_type,
     }
     errors = _tried("calibrations", asked)
     found |= summed(errors)

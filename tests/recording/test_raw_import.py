@@ -399,7 +399,9 @@ def test_sensors_the_glove_does_not_have_need_a_layout(folder):
 
 
 def test_samples_of_nobody_need_a_layout(folder):
-    refused(folder({"time_s": np.arange(5.0), "x": np.ones(5)}), r"no layout\.toml names the sensors")
+    refused(
+        folder({"time_s": np.arange(5.0), "x": np.ones(5)}), r"no layout\.toml names the sensors"
+    )
 
 
 def test_a_sensor_of_the_layout_without_columns(folder):
@@ -412,7 +414,7 @@ def test_a_sensor_of_the_layout_without_columns(folder):
     [
         ("[sensors", r"layout\.toml: not a layout"),
         ("", r"layout\.toml: The layout has no sensors"),
-        ('hand_type = 4', r"layout\.toml: not a layout.*hand_type"),
+        ("hand_type = 4", r"layout\.toml: not a layout.*hand_type"),
         ('hand_type = 1\n[sensors]\nupper = "a"', r"layout\.toml: hand_type divides"),
         ("sensors = 5", r"layout\.toml: not a layout.*\$\.sensors"),
         ("[sensors]\nupper = 3", r"layout\.toml: not a layout.*str"),
