@@ -53,6 +53,7 @@ from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
+    HeadingTaken,
     NotePage,
     Phase,
     ResetHeading,
@@ -411,9 +412,6 @@ class Studio:
                 self._holder.use(which)
             case intents.ResetHeading(sensor=sensor):
                 self.capture.send(ResetHeading(sensor))
-                if self.state.newest.recorder is None:
-                    of = sensor or _("all sensors")
-                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
             case intents.OpenTake() | intents.ChooseSubject() | intents.DeleteSubject() if on:
                 raise HandstudioError(
                     "A course of calibration is on.", "Leave it first; it can be gone on with."
@@ -674,13 +672,17 @@ class Studio:
             shaking = shaken.heeded(shaking, motions)
         self.state = replace(self.state, newest=newest, live=live, shaking=shaking)
         for report in self.capture.reports():
-            if isinstance(report, TakeDone):
-                self._take_done(report.path)
-            else:
-                self._calibrator.take_failed(report)
-                self._sound(Sound.ALARM)
-                self._say(report)
-                self.refresh_takes()
+            match report:
+                case TakeDone(path=path):
+                    self._take_done(path)
+                case HeadingTaken(sensor=sensor):
+                    of = sensor or _("all sensors")
+                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
+                case HandstudioError():
+                    self._calibrator.take_failed(report)
+                    self._sound(Sound.ALARM)
+                    self._say(report)
+                    self.refresh_takes()
 
     def _take_done(self, path: Path) -> None:
         self.refresh_takes()
