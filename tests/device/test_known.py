@@ -17,6 +17,7 @@ from handstudio.device.capture import Capture, _Wanted
 from handstudio.device.known import Known
 from handstudio.device.orders import (
     Connect,
+    HeadingTaken,
     ResetHeading,
     SetFilter,
     SetHand,
@@ -138,7 +139,7 @@ def test_a_reset_turns_headings_without_a_rest_and_twice_is_as_once(connected):
     connected.send(ResetHeading("SN1"))
     connected.go_on(5)
     assert not connected.newest.motion.doubt.any()
-    assert not connected.reports
+    assert connected.reports == [HeadingTaken(None), HeadingTaken("SN1")]
 
 
 def test_the_heading_stays_while_a_take_is_recorded(connected):
