@@ -197,7 +197,7 @@ def test_a_take_keeps_the_filter_it_began_with_and_the_other_comes_after(connect
 
 
 @pytest.mark.parametrize(
-    "another", [SetSubject(HAND), SetSubject(None), SetHand(HandModel(3, 0.2))]
+    "another", [SetSubject(HAND), SetSubject(None), SetHand(HandModel(hand_length_m=0.2))]
 )
 def test_of_another_hand_the_joints_are_learnt_anew_and_attitudes_stay(another):
     setup = calibrated(Setup(glove_layout(), 100.0, filter=TreeFilter()), subject=KNOWN)
