@@ -17,6 +17,9 @@ ALARM = (226, 75, 74)
 DEAD = (104, 108, 116)
 BOARD = (70, 92, 120)
 GHOST = (138, 146, 158)
+SKIN = (222, 196, 172)  # like nobody's
+SECOND = (122, 168, 222)  # the skin of a hand to compare with
+DOUBT = (60, 64, 72)  # hatching on skin
 LIT = (255, 236, 92)
 
 PARTS = {

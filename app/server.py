@@ -124,7 +124,8 @@ class Server:
         view = scene_of(state)
         self._scene.furnish(dark=state.settings.theme == "dark")
         self._scene.render(view, state.yaw, state.settings.shown)
-        self._scene.render_ghost(ghost_view(state) or compared_ghost(state))
+        ghost = ghost_view(state) or compared_ghost(state)
+        self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.say(overlay_of(state))
         # aimed when asked for, and when the picture is turned otherwise or a hand appears: from
         # the desk all that looks the same
