@@ -127,11 +127,11 @@ class Server:
         ghost = ghost_view(state) or compared_ghost(state)
         self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.say(overlay_of(state))
-        # aimed when asked for, and when the picture is turned otherwise or a hand appears: from
-        # the desk all that looks the same
+        # aimed when asked for, when a take is opened or left, and when the picture is turned
+        # otherwise or a hand appears: from the desk all that looks the same
         fixed = state.view is View.DESK
         turned = None if fixed else (state.yaw, isinstance(view, HandView))
-        aimed = state.aimed, turned, looks_near(state)
+        aimed = state.aimed, turned, looks_near(state), state.review is not None
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))
