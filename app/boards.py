@@ -53,7 +53,8 @@ def boards_of(layout: Layout, skeleton: Skeleton) -> Boards:
         names.append(sensor.sensor)
         segments.append(segment)
         along = _ALONG.get(sensor.sensor, 0.5) * far[segment]
-        places.append(along + [0.0, 0.0, _back(skin, segment, along) + _THICK * BOARD_M])
+        height = _back(skin, segment, along) + _THICK * BOARD_M
+        places.append(along + np.array([0.0, 0.0, height]))
     tints = tuple(colours.of_part(SEGMENTS[segment]) for segment in segments)
     return Boards(tuple(names), tuple(segments), np.array(places).reshape(-1, 3), tints)
 

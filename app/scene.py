@@ -256,8 +256,12 @@ class _GhostNodes:
             return
         if view.skeleton is not self._skeleton or view.moving is not self._moving:
             self._build(view)
+        # in the place of the other hand its bones would hide that one's
+        apart = view.beside or not shown.skin
         for bones in self._sets:
             handle = self._bones[bones.mesh]
+            if handle.visible != apart:
+                handle.visible = apart
             q, t = bones.placed(view.pose)
             handle.batched_wxyzs, handle.batched_positions = q, t + _place(view)
         if self._label is not None:

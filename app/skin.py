@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import viser
 
@@ -15,6 +13,9 @@ from handstudio.hand.surface import SkinnedMesh
 from handstudio.hand_surface import skinned
 
 _ABOVE_M = 0.0006  # a patch lies on the skin
+_HATCHING = 0.4
+_TURNED = 1e-4  # of a quaternion's parts: less, and less than that far, nobody sees
+_MOVED_M = 5e-5
 
 
 class SkinNodes:
@@ -30,8 +31,8 @@ class SkinNodes:
         self._server, self._name, self._shadow = server, name, shadow
         self._skeleton: Skeleton | None = None
         self._mesh: SkinnedMesh | None = None
-        self._node: viser.MeshSkinnedHandle | None = None
-        self._patches: dict[tuple[int, bool], _Patch] = {}
+        self._skin: _Carried | None = None
+        self._patches: dict[tuple[int, bool], _Carried] = {}
 
     def render(
         self,
@@ -50,14 +51,14 @@ class SkinNodes:
             opacity: None where nothing is to be seen through it.
             place: Where it stands from where the pose has it [m].
         """
-        if skeleton is not self._skeleton or self._node is None:
+        if skeleton is not self._skeleton or self._skin is None:
             self.clear()
             self._skeleton, self._mesh = skeleton, skinned(skeleton)
-            self._node = self._add(self._name, self._mesh, colour, opacity)
-        for name, value in (("color", colour), ("opacity", opacity), ("visible", True)):
-            if getattr(self._node, name) != value:
-                setattr(self._node, name, value)
-        _move(self._node, range(len(SEGMENTS)), pose, place)
+            self._skin = self._add(self._mesh, colour, opacity)
+        for name, value in (("color", colour), ("opacity", opacity)):
+            if getattr(self._skin.node, name) != value:
+                setattr(self._skin.node, name, value)
+        self._skin.show(pose, place)
 
     def mark(self, pose: Pose, doubtful: Array, dead: Array) -> None:
         """Hatch the segments that are in doubt, grey those that are dead."""
@@ -71,23 +72,23 @@ class SkinNodes:
 
     def hide(self) -> None:
         """Out of sight, but kept."""
-        if self._node is not None and self._node.visible:
-            self._node.visible = False
+        if self._skin is not None:
+            self._skin.hide()
 
     def clear(self) -> None:
         """Take it off the scene."""
         for patch in self._patches.values():
             patch.node.remove()
         self._patches.clear()
-        if self._node is not None:
-            self._node.remove()
-        self._node, self._mesh, self._skeleton = None, None, None
+        if self._skin is not None:
+            self._skin.node.remove()
+        self._skin, self._mesh, self._skeleton = None, None, None
 
     def _add(
-        self, name: str, mesh: SkinnedMesh, colour: tuple[int, int, int], opacity: float | None
-    ) -> viser.MeshSkinnedHandle:
-        return self._server.scene.add_mesh_skinned(
-            name,
+        self, mesh: SkinnedMesh, colour: tuple[int, int, int], opacity: float | None
+    ) -> _Carried:
+        node = self._server.scene.add_mesh_skinned(
+            self._name,
             mesh.vertices,
             mesh.faces,
             bone_wxyzs=mesh.bound.q_world_segment,
@@ -98,8 +99,9 @@ class SkinNodes:
             cast_shadow=self._shadow,
             receive_shadow=False,
         )
+        return _Carried(node, np.arange(len(SEGMENTS)))
 
-    def _patch(self, mesh: SkinnedMesh, segment: int, dead: bool) -> _Patch:
+    def _patch(self, mesh: SkinnedMesh, segment: int, dead: bool) -> _Carried:
         part, faces = mesh.part(segment)
         weights = mesh.dense_weights()[part]
         carrying = np.flatnonzero(weights.any(axis=0))
@@ -113,32 +115,34 @@ class SkinNodes:
             skin_weights=weights[:, carrying],
             color=colours.DEAD if dead else colours.DOUBT,
             wireframe=not dead,
+            opacity=None if dead else _HATCHING,
             cast_shadow=False,
             receive_shadow=False,
         )
-        return _Patch(node, tuple(carrying.tolist()))
+        return _Carried(node, carrying)
 
 
-class _Patch:
-    """What covers the part of the skin that a segment carries."""
+class _Carried:
+    """A skinned mesh that is carried by some segments; only what has moved to be seen is sent."""
 
-    def __init__(self, node: viser.MeshSkinnedHandle, carrying: tuple[int, ...]) -> None:
-        self.node, self._carrying = node, carrying
+    def __init__(self, node: viser.MeshSkinnedHandle, segments: Array) -> None:
+        self.node, self._segments = node, segments
+        self._q, self._place = np.zeros((len(segments), 4)), np.zeros((len(segments), 3))
 
-    def show(self, pose: Pose) -> None:
+    def show(self, pose: Pose, beside: Array | None = None) -> None:
+        """In a single pose; ``beside`` is where it stands from where the pose has it [m]."""
         if not self.node.visible:
             self.node.visible = True
-        _move(self.node, self._carrying, pose, None)
+        q, place = pose.q_world_segment[self._segments], pose.t_world_joint[self._segments]
+        if beside is not None:
+            place = place + beside
+        turned = np.abs(q - self._q).max(axis=1) > _TURNED
+        moved = np.abs(place - self._place).max(axis=1) > _MOVED_M
+        for i in np.flatnonzero(turned | moved):
+            self.node.bones[i].wxyz, self.node.bones[i].position = q[i], place[i]
+            self._q[i], self._place[i] = q[i], place[i]
 
     def hide(self) -> None:
+        """Out of sight, but kept."""
         if self.node.visible:
             self.node.visible = False
-
-
-def _move(
-    node: viser.MeshSkinnedHandle, carrying: Iterable[int], pose: Pose, place: Array | None
-) -> None:
-    at = pose.t_world_joint if place is None else pose.t_world_joint + place
-    for bone, segment in zip(node.bones, carrying, strict=True):
-        bone.wxyz = pose.q_world_segment[segment]
-        bone.position = at[segment]

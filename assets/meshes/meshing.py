@@ -188,7 +188,7 @@ def evened(vertices: Array, faces: Array) -> Array:
 
 def drawn_onto(solid: Solid, vertices: Array, steps: int = 1) -> Array:
     """Newton's way onto the surface along the solid's slope."""
-    reach = 0.05 * MM
+    reach = 5e-5
     for _ in range(steps):
         slope = np.stack(
             [

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int64
 from handstudio.arrays import Array
 from handstudio.hand.pose import Pose, posed
 from handstudio.hand.rig import MOST_BONES, SEGMENT_OF_BONE, rig_of
-from handstudio.hand.skeleton import SEGMENTS, Skeleton, nominal_skeleton
+from handstudio.hand.skeleton import SEGMENTS, HandSide, Skeleton, nominal_skeleton
 from handstudio.maths import so3
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -148,7 +148,7 @@ def _least_turn(a: Array, b: Array) -> Array:
 
 
 def _mirrored(skeleton: Skeleton) -> Skeleton:
-    side = "left" if skeleton.side == "right" else "right"
+    side: HandSide = "left" if skeleton.side == "right" else "right"
     return Skeleton(
         side,
         skeleton.t_parent_joint * MIRROR,

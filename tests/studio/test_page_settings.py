@@ -99,9 +99,7 @@ def test_every_view_sees_the_whole_hand(review: Review, view: View, studio: Stud
     assert abs(float((camera.up**2).sum()) - 1.0) < 1e-9
 
 
-def test_an_open_takes_hand_stands_clear_of_the_sheet_below(
-    review: Review, studio: Studio
-) -> None:
+def test_an_open_takes_hand_stands_clear_of_the_sheet_below(review: Review, studio: Studio) -> None:
     state = replace(studio.state, review=review)
     shown = scene_of(state)
     assert isinstance(shown, HandView)
