@@ -86,6 +86,24 @@ def process(
     return motion
 
 
+def process_head(take: Take, seconds: float = 10.0) -> Motion:
+    """The motion of a take's first seconds, in memory: to look at until all of it is there.
+
+    Raises:
+        TakeError: the take is damaged.
+        SetupError: the stored state does not fit this version.
+    """
+    setup = take.header.setup
+    state, motions, wanted = first_state(take, setup), [], seconds * setup.rate_hz
+    for events in take.events():
+        motion, state = pipeline.run(setup, state, events)
+        motions.append(motion)
+        wanted -= len(motion)
+        if wanted <= 0.0:
+            break
+    return pipeline.join(motions) if motions else pipeline.empty(len(setup.layout.sensors))
+
+
 def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
     """The motion of a take where it was computed before and is whole, else None.
 
@@ -188,7 +206,7 @@ def _compute(take: Take, setup: Setup, from_start: bool, folder: Path, progress:
 def _fill(
     writer: MotionWriter, take: Take, setup: Setup, from_start: bool, progress: Progress
 ) -> None:
-    state = _first_state(take, setup, from_start)
+    state = first_state(take, setup, from_start)
     whole = max(1, take.summary.bytes if take.summary else take.path.stat().st_size)
     seen = 0
     smoother = Smoother(setup) if setup.smooth else None
@@ -211,7 +229,12 @@ def _size(event: Event, kind: Literal["wire", "samples"]) -> int:
     return len(event) * per_sensor * event.gyr.shape[1] if isinstance(event, ImuSamples) else 0
 
 
-def _first_state(take: Take, setup: Setup, from_start: bool) -> pipeline.State:
+def first_state(take: Take, setup: Setup, from_start: bool = False) -> pipeline.State:
+    """What the pipeline knew at the first byte of a take.
+
+    Raises:
+        SetupError: the stored state does not fit this version.
+    """
     if from_start or not take.first_state.pipeline:
         return pipeline.begin(setup)
     return pipeline.unpack(setup, take.first_state.pipeline)
