@@ -49,7 +49,7 @@ class HandFit:
 def fit_of(setup: Setup) -> HandFit:
     """The hand a setup describes: the calibrated one, else mean proportions of its length.
 
-    Kept for the setups asked about last: a page asks for every picture.
+    The same object for the same setup, as long as it is among those asked about last.
 
     Raises:
         LayoutError: the layout is not a hand's.
