@@ -23,6 +23,7 @@ from handstudio.commands import keeping
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
+from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
 from handstudio.device import find
@@ -341,6 +342,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "info": info,
     "process": process,
     "export": export,
+    "measure": measure,
     "import": import_,
     "recover": recover,
     "simulate": virtual_commands.simulate,

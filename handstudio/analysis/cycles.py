@@ -36,7 +36,7 @@ class Cycles:
 
     ways: Int64[Array, "h 2"]
     amplitude: Float[Array, " c"]
-    period_s: Float[Array, " c"]
+    period_s: Float[Array, " p"]
 
     def __len__(self) -> int:
         return len(self.amplitude)

@@ -13,7 +13,7 @@ from handstudio.arrays import Array
 
 HELD_S = 0.05
 """Of a running median this long: spikes of less than half of it are gone, and the turning point of
-a swing at 2 Hz loses 1 % of its amplitude."""
+a swing at 2 Hz loses 2 % of its amplitude."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,17 +105,18 @@ def _score(
     if found is None:
         return None
     fist, open_ = found.most_at, found.least_at
-    # a joint that is not short of straight is counted as straight, whatever its zero: only the
-    # joints that lack extension bring their error in twice
-    parts = [series.sd_at(name, fist) for name in names]
-    parts += [series.sd_at(n, open_) for n, a in zip(names, angles[open_], strict=True) if a > 0.0]
+    # a sum of joints is the turn of the last bone in the first: what a board between errs adds to
+    # one joint and is missing at the next, so that of each end joint one of two boards is left
+    ends = [(name, at) for name in (names[0], names[-1]) for at in (fist, open_)]
+    # a joint that is straight or beyond counts as straight, whatever its zero
+    lacking = [series.sd_at(n, at) for n, at in ends if at == fist or series.of(n)[at] > 0.0]
     details = {
         "flexion_deg": float(np.rad2deg(found.most)),
         "deficit_deg": float(np.rad2deg(found.least)),
         "flexion_at_s": float(series.time_s[fist]),
         "extension_at_s": float(series.time_s[open_]),
     }
-    value, sd = found.most - found.least, float(np.linalg.norm(parts))
+    value, sd = found.most - found.least, float(np.linalg.norm(lacking) / np.sqrt(2.0))
     return float(np.rad2deg(value)), float(np.rad2deg(sd)), details
 
 

@@ -147,4 +147,5 @@ def _points(
     else:
         y = np.array([0.0, float(length_m[k]), 0.0])
         end = start + so3.rotate(pose.q_world_segment[:, k], y)
-    return start[:, None] + shares[None, :, None] * (end - start)[:, None]
+    points: Array = start[:, None] + shares[None, :, None] * (end - start)[:, None]
+    return points

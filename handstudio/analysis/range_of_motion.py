@@ -9,7 +9,7 @@ import numpy as np
 from handstudio.analysis.extremes import extremes
 from handstudio.analysis.measure import Kind, Measure, WhyNot, missing
 from handstudio.analysis.norms import norms_of
-from handstudio.analysis.series import AngleSeries
+from handstudio.analysis.series import AngleSeries, flexion_beside
 from handstudio.analysis.uncertainty import detectable
 from handstudio.hand.angles import ROOT_ANGLES, hand_angles
 
@@ -44,10 +44,10 @@ def _of(series: AngleSeries, name: str) -> list[Measure]:
     level = float(series.level_sd[column])
     span = found.most - found.least
     moments = series.moment_sds(name)
-    # the zero falls out of a range; half of a level is taken for what bends its scale instead
     dragged = float(series.share_sd[column]) * span
+    leaked = level * _leaking(series, name)
     span_sd = float(
-        np.linalg.norm([moments[found.least_at], moments[found.most_at], dragged, 0.5 * level])
+        np.linalg.norm([moments[found.least_at], moments[found.most_at], dragged, leaked])
     )
     norm = norms_of(name)
     values_sds = (
@@ -68,6 +68,19 @@ def _of(series: AngleSeries, name: str) -> list[Measure]:
         )
         for kind, (value, sd, at), usual in zip(_KINDS, values_sds, norm, strict=True)
     ]
+
+
+def _leaking(series: AngleSeries, name: str) -> float:
+    """By how much of its level a range is off: the zero itself falls out of it.
+
+    An axis that is off lets so much of the joint's flexion, per radian, into the turns beside it;
+    of flexion itself half is taken for what bends its scale.
+    """
+    flexion = flexion_beside(name)
+    if flexion == name or flexion not in series:
+        return 0.5
+    found = extremes(series.time_s, series.of(flexion))
+    return 0.5 if found is None else max(0.5, found.most - found.least)
 
 
 def _why(series: AngleSeries, name: str) -> WhyNot:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from handstudio.analysis.uncertainty import level_sds, skin_shares
 from handstudio.arrays import Array
-from handstudio.hand.angles import Angle, joint_index
+from handstudio.hand.angles import Angle, hand_angles, joint_index
 from handstudio.hand.skeleton import PARENTS, SEGMENTS
 from handstudio.hand_fit import fit_of
 from handstudio.kinematics import angles_of, doubtful_segments, measured_angles
@@ -67,6 +67,12 @@ class AngleSeries:
     def sd_at(self, name: str, at: int) -> float:
         """The same at one instant."""
         return float(self.sds(name)[at])
+
+
+def flexion_beside(name: str) -> str:
+    """The flexion of the joint that an angle belongs to; itself, if it is that."""
+    joints = {angle.name: angle.joint for angle in hand_angles()}
+    return f"{joints[name]}_flexion"
 
 
 FILTER_UNTOLD_SD = float(np.deg2rad(1.5))

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from scipy.signal import savgol_filter
 
 from handstudio.analysis.extremes import extremes
-from handstudio.analysis.measure import Measure, missing
-from handstudio.analysis.series import AngleSeries
+from handstudio.analysis.measure import Measure, WhyNot, missing
+from handstudio.analysis.series import AngleSeries, flexion_beside
 from handstudio.analysis.stretches import rate_of, unbroken
 from handstudio.arrays import Array
 
@@ -19,12 +19,12 @@ WINDOW_S = 0.09
 MOVING_RAD_S = float(np.deg2rad(10.0))
 """From this speed on a joint moves."""
 
-NOISE_SD = float(np.deg2rad(2.0))
-"""Of a speed where nothing moves [rad/s]."""
+NOISE_DEG_S = 2.0
+"""Of a speed where nothing moves."""
 
 
 def velocity(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Slope of a local cubic [1/s]; NaN outside unbroken stretches as long as its window."""
+    """Slope of a local cubic [1/s]; NaN where its window would reach over the end of a stretch."""
     out = np.full(len(values), np.nan)
     if len(time_s) < 2:
         return out
@@ -32,35 +32,40 @@ def velocity(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Float[Ar
     window = max(5, round(WINDOW_S * rate) | 1)
     for part in unbroken(time_s, values):
         if part.stop - part.start >= window:
-            out[part] = savgol_filter(values[part], window, 3, deriv=1, delta=1.0 / rate)
+            inner = slice(part.start + window // 2, part.stop - window // 2)
+            slope = savgol_filter(values[part], window, 3, deriv=1, delta=1.0 / rate)
+            out[inner] = slope[window // 2 : len(slope) - window // 2]
     return out
 
 
-def speeds(series: AngleSeries, name: str, rates: Float[Array, " n"]) -> list[Measure]:
-    """Peak and mean speed [deg/s] of one angle, from its `velocity`."""
+def speeds(
+    series: AngleSeries, name: str, rates: Float[Array, " n"], flexion_rad_s: float
+) -> list[Measure]:
+    """Peak and mean speed [deg/s] of one angle.
+
+    Args:
+        series: The angles.
+        name: Which one.
+        rates: Its `velocity`.
+        flexion_rad_s: Peak speed of its joint's flexion: an axis that is off lets a share of it
+            into the turns beside.
+    """
     found = extremes(series.time_s, np.abs(rates))
     if found is None:
-        why = "too_short" if np.isfinite(series.of(name)).any() else "in_doubt"
+        why: WhyNot = "too_short" if np.isfinite(series.of(name)).any() else "in_doubt"
         return [missing("peak_speed", name, "deg/s", why)]
-    peak = float(np.rad2deg(found.most))
-    out = [
-        Measure(
-            "peak_speed",
-            name,
-            peak,
-            "deg/s",
-            sd=_sd(series, name, peak),
-            at_s=float(series.time_s[found.most_at]),
-        )
-    ]
+
+    def sd(speed: float) -> float:
+        column = series.names.index(name)
+        share = 1.0 if flexion_beside(name) != name else 0.5
+        leaked = share * float(series.level_sd[column]) * np.rad2deg(flexion_rad_s)
+        dragged = float(series.share_sd[column]) * speed
+        return float(np.linalg.norm([dragged, leaked, NOISE_DEG_S]))
+
+    peak, at_s = float(np.rad2deg(found.most)), float(series.time_s[found.most_at])
+    out = [Measure("peak_speed", name, peak, "deg/s", sd=sd(peak), at_s=at_s)]
     moving: Array = np.abs(rates[np.abs(rates) > MOVING_RAD_S])
     if not len(moving):
         return [*out, missing("mean_speed", name, "deg/s", "no_movement")]
     mean = float(np.rad2deg(moving.mean()))
-    return [*out, Measure("mean_speed", name, mean, "deg/s", sd=_sd(series, name, mean))]
-
-
-def _sd(series: AngleSeries, name: str, speed: float) -> float:
-    """What skin and noise leave in doubt of a speed [deg/s]."""
-    share = float(series.share_sd[series.names.index(name)])
-    return float(np.hypot(share * speed, np.rad2deg(NOISE_SD)))
+    return [*out, Measure("mean_speed", name, mean, "deg/s", sd=sd(mean) * mean / peak)]

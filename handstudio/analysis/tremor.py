@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import periodogram
+from scipy.signal import detrend, periodogram
+from scipy.stats import chi2
 
 from handstudio.analysis.measure import Measure, WhyNot, missing
 from handstudio.analysis.series import AngleSeries
@@ -28,13 +29,13 @@ HELD_RAD = float(np.deg2rad(10.0))
 NOISE_DEG = 0.003
 """What is left in the band of a hand at rest, mostly white noise of gyroscopes."""
 
-STANDS_OUT = 4.0
-"""Times the median of the band's spectrum of rates: less is no peak."""
+CHANCE = 0.01
+"""How often noise alone may be taken for a peak."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Power of an angle [rad²/Hz] over frequency, a mean over so many windows; NaN of none."""
+    """Power of an angle [rad²/Hz] over frequency, a mean over so many windows; empty of none."""
 
     frequency_hz: Float[Array, " f"]
     power: Float[Array, " f"]
@@ -49,20 +50,26 @@ class Spectrum:
 
     @property
     def peak_hz(self) -> float | None:
-        """Where the spectrum of the angle's rate is highest in the band; None: nothing stands out.
-
-        Of the rate: an angle's own falls off so steeply that any movement hides what is above.
-        """
+        """Where power rises highest above a power law through the band; None: nothing stands."""
         inside = np.flatnonzero(self._band)
-        rate = self.power[inside] * (2.0 * np.pi * self.frequency_hz[inside]) ** 2
-        best = int(rate.argmax())
-        inner = 0 < best < len(rate) - 1
-        if not inner or rate[best] < STANDS_OUT * float(np.median(rate)):
+        across, up = np.log(self.frequency_hz[inside]), np.log(self.power[inside])
+        above = up - np.polyval(np.polyfit(across, up, 1), across)
+        best = int(above.argmax())
+        inner = 0 < best < len(above) - 1
+        if not inner or above[best] - np.median(above) < np.log(self._stands_out(len(above))):
             return None
-        left, top, right = np.log(rate[best - 1 : best + 2])
+        left, top, right = up[best - 1 : best + 2]
         shift = 0.5 * (left - right) / (left - 2.0 * top + right)  # parabola through three
         step = self.frequency_hz[1] - self.frequency_hz[0]
         return float(self.frequency_hz[inside[best]] + shift * step)
+
+    def _stands_out(self, bins: int) -> float:
+        """How many times the median noise reaches in one of so many bins by `CHANCE` alone.
+
+        Windows that overlap by half count for about 0.65 each.
+        """
+        freedom = 2.0 * max(1.0, 0.65 * self.windows)
+        return float(chi2.ppf(1.0 - CHANCE / bins, freedom) / chi2.median(freedom))
 
     @property
     def _band(self) -> Array:
@@ -86,10 +93,17 @@ def spectrum_of(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Spect
     ]
     if not windows:
         return None
-    held = np.array([each for each in windows if _is_held(each, rate)]).reshape(-1, size)
-    frequency, power = periodogram(held, rate, window="hann", detrend="linear", axis=-1)
-    mean = power.mean(axis=0) if len(held) else np.full(len(frequency), np.nan)
-    return Spectrum(frequency, mean, len(held))
+    held = [each for each in windows if _is_held(each, rate)]
+    if not held:
+        return Spectrum(np.empty(0), np.empty(0), 0)
+    frequency, power = periodogram(np.array(held), rate, window="hann", detrend=_level, axis=-1)
+    return Spectrum(frequency, power.mean(axis=0), len(held))
+
+
+def _level(windows: Array) -> Array:
+    """Windows without their trends."""
+    out: Array = detrend(windows, axis=-1)
+    return out
 
 
 def _is_held(window: Array, rate: float) -> bool:

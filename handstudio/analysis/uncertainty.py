@@ -21,7 +21,7 @@ ZERO_SD = float(np.deg2rad(1.0))
 SKIN_SD = float(np.deg2rad(1.0))
 """What skin turns a board off its bone, beyond what a calibration takes off."""
 
-SKIN_SHARE, SKIN_SHARE_LAST = 0.04, 0.09
+SKIN_SHARE, SKIN_SHARE_LAST = 0.03, 0.07
 """What skin drags along a board of what its joint turns, beyond what a calibration takes off; the
 second at the last joint of a finger, where no joint beyond tells of it. Chosen on virtual people 1
 and 2 with typical imperfections and calibrations of their own (docs/measures.md)."""

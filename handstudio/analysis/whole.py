@@ -15,7 +15,7 @@ from handstudio.analysis.kapandji import STAGES, clearances, kapandji_measures
 from handstudio.analysis.measure import Measure, missing
 from handstudio.analysis.posture_time import DEFAULT_BANDS, Band, posture_measures
 from handstudio.analysis.range_of_motion import ranges_of_motion, unmeasured
-from handstudio.analysis.series import AngleSeries
+from handstudio.analysis.series import AngleSeries, flexion_beside
 from handstudio.analysis.smoothness import smoothness_measures
 from handstudio.analysis.speed import speeds, velocity
 from handstudio.analysis.stretches import rate_of
@@ -63,12 +63,16 @@ def measures_of(
     out += _opposition(setup, motion, series)
     progress(0.3)
     moved = []
-    for done, name in enumerate(series.names):
-        moved += _movement(series, name)
+    fastest = dict[str, float]()
+    for done, name in enumerate(
+        sorted(series.names, key=lambda each: flexion_beside(each) != each)
+    ):
+        moved += _movement(series, name, fastest)
         progress(0.3 + 0.5 * (done + 1) / len(series.names))
     if not any(measure.kind == "cycles" for measure in moved):
         moved.append(missing("cycles", "", "", "no_movement"))
-    out += sorted(moved, key=lambda measure: _ORDER.index(measure.kind))
+    places = {name: place for place, name in enumerate((*series.names, ""))}
+    out += sorted(moved, key=lambda m: (_ORDER.index(m.kind), places[m.about]))
     for name in tremor_angles(series):
         out += tremor_measures(series, name, spectrum_of(series.time_s, series.of(name)))
     out += independence_measures(series, asked.labels)
@@ -89,11 +93,16 @@ _ORDER = (
 )
 
 
-def _movement(series: AngleSeries, name: str) -> list[Measure]:
-    """Speed of every angle; repetitions and smoothness of those that were repeated."""
+def _movement(series: AngleSeries, name: str, fastest: dict[str, float]) -> list[Measure]:
+    """Speed of every angle; repetitions and smoothness of those that were repeated.
+
+    ``fastest`` keeps the peak speeds of flexions, which come first [rad/s].
+    """
     values = series.of(name)
     rates = velocity(series.time_s, values)
-    out = speeds(series, name, rates)
+    if np.isfinite(rates).any():
+        fastest[name] = float(np.nanmax(np.abs(rates)))
+    out = speeds(series, name, rates, fastest.get(flexion_beside(name), 0.0))
     cycles = cycles_of(series.time_s, values)
     if len(cycles) >= LEAST_CYCLES:
         out += cycle_measures(series, name, cycles)
