@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +12,7 @@ from app.channels import sds_of, values_of
 from app.comparison import Comparison, compared, picked, seconds_of
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
+from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
@@ -42,6 +44,8 @@ class Review:
     smooth: bool = False  # somebody wants it smoothed; it is once that is computed
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
+    earlier: Path | None = None  # the take of an earlier visit that measures are held against
+    measured: Measured | None = None
 
     @property
     def setup(self) -> Setup:
@@ -95,7 +99,17 @@ def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
     new = opened(review.take, motion, setup)
     same = {
         name: getattr(review, name)
-        for name in ("playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare")
+        for name in (
+            "playing",
+            "speed",
+            "in_s",
+            "out_s",
+            "loop",
+            "notes",
+            "smooth",
+            "compare",
+            "earlier",
+        )
     }
     return replace(new, at_s=min(review.at_s, new.duration_s), **same)
 

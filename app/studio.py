@@ -29,7 +29,15 @@ from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Solved, Uncomputed, Workshop
+from app.workshop import (
+    Computed,
+    Exported,
+    Gathered,
+    MeasuredPart,
+    Solved,
+    Uncomputed,
+    Workshop,
+)
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
@@ -179,6 +187,8 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.CompareVisits() | intents.MeasureHand() | intents.MakeReport():
+                self._measure(intent)
             case intents.Smooth(on=on):
                 self._ask_of_review(smooth=on)
             case intents.Compare(name=name):
@@ -564,6 +574,23 @@ class Studio:
         window = Window(review.in_s, review.out_s)
         self._workshop.export(review.take.path, order.content, window, order.page, review.used)
 
+    def _measure(
+        self, order: intents.CompareVisits | intents.MeasureHand | intents.MakeReport
+    ) -> None:
+        review = self.state.review
+        if review is None:
+            return
+        part = Window(review.in_s, review.out_s)
+        match order:
+            case intents.CompareVisits(earlier=earlier):
+                self.state = replace(
+                    self.state, review=replace(review, earlier=earlier, measured=None)
+                )
+            case intents.MeasureHand():
+                self._workshop.measure(review.take, part, review.used, review.earlier)
+            case intents.MakeReport(page=page):
+                self._workshop.report(review.take.path, part, page, review.used, review.earlier)
+
     def _send_diagnostics(self, page: int) -> None:
         settings = msgspec.to_builtins(self.store.settings)
         work = partial(
@@ -625,6 +652,8 @@ class Studio:
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
+                case MeasuredPart(take=take, measured=measured) if self._is_open(take):
+                    self._ask_of_review(measured=measured)
                 case Gathered(download=download):
                     self._send_file(download)
                 case Solved(answer=answer):

@@ -83,7 +83,7 @@ def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Trut
     trajectory = perform(COURSE, Actor(someone, asked.seed, material()))
     samples, truth = _sensed(someone, asked, trajectory, occasion=0)
     labels = sorted((span.start_s, span.end_s, span.name) for span in trajectory.spans)
-    recorded = even([samples], RATE_HZ, known, glove().names)
+    recorded = even([samples], float(RATE_HZ), known, glove().names)
     swings = opened(glove(), float(RATE_HZ), recorded, labels, calibrated=known is not None)
     priors = ROUGH if known is None else asked.priors
     hand = found(swings, someone.side, someone.hand_length_m, priors)
