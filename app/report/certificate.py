@@ -58,15 +58,16 @@ def _hand(setup: Setup, subject: SubjectCalibration, recorded: datetime | None) 
         facts.append((_("Mirrored from"), subject.mirrored_from))
     if steps:
         facts.append((_("Steps"), good))
-    warning = ""
+    warnings = []
     worn = setup.device.serial_number if setup.device is not None else ""
     if subject.device and worn and subject.device != worn:
-        warning = _(
+        other = _(
             "The take is of the glove {worn}, the calibration of {other}: sensors sit otherwise."
-        ).format(worn=worn, other=subject.device)
-    elif bad:
-        warning = _("Not as it should be: {steps}.").format(steps=", ".join(bad))
-    return Listing(_("The hand"), tuple(facts), warning=warning)
+        )
+        warnings.append(other.format(worn=worn, other=subject.device))
+    if bad:
+        warnings.append(_("Not as it should be: {steps}.").format(steps=", ".join(bad)))
+    return Listing(_("The hand"), tuple(facts), warning=" ".join(warnings))
 
 
 def _joints(subject: SubjectCalibration) -> Listing:
@@ -169,7 +170,7 @@ def _segment(name: str) -> str:
         "intermediate": _("middle phalanx"),
         "distal": _("distal"),
     }
-    whole = {"hand": _("Hand")}.get(name)
+    whole = {"hand": _("Palm")}.get(name)
     return whole or " ".join(filter(None, [about_name(f"{first}_"), parts.get(rest, rest)]))
 
 

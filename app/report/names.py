@@ -131,9 +131,9 @@ def about_name(about: str) -> str:
     part = {
         "elbow": _("Elbow"),
         "forearm": _("Forearm"),
-        "wrist": _("Wrist"),
+        "wrist": _("wrist").capitalize(),
         "ulnar": _("Edge of the palm"),
-        "thumb": _("Thumb"),
+        "thumb": _("thumb").capitalize(),
         "index": _("Index"),
         "middle": _("Middle"),
         "ring": _("Ring"),
@@ -149,7 +149,7 @@ def about_name(about: str) -> str:
         "pronation": _("pronation"),
         "ulnar": _("ulnar deviation"),
     }
-    joints = {"mcp": "MCP", "pip": "PIP", "dip": "DIP", "cmc": "CMC", "ip": "IP"}
+    joints = {"mcp": _("MCP"), "pip": _("PIP"), "dip": _("DIP"), "cmc": _("CMC"), "ip": _("IP")}
     between = "" if first == "ulnar" else joints.get(joint, "")
     return " ".join(filter(None, [part, between, turns.get(turn, turn)]))
 

@@ -21,7 +21,7 @@
     const a = Math.cos(turn) * x - Math.sin(turn) * y, b = Math.sin(turn) * x + Math.cos(turn) * y;
     const up = Math.sin(tilt) * b + Math.cos(tilt) * z, deep = Math.cos(tilt) * b - Math.sin(tilt) * z;
     const scale = zoom * size.unit / (1 + 0.9 * deep);
-    return { x: size.w / 2 + scale * a, y: size.h * 0.6 - scale * up, deep: deep, scale: scale };
+    return { x: size.w / 2 + scale * a, y: size.h * 0.7 - scale * up, deep: deep, scale: scale };
   }
   function shaded(colour, deep) {
     const fade = Math.min(0.45, Math.max(0, 0.15 + 1.6 * deep));
@@ -33,7 +33,7 @@
     if (canvas.width !== Math.round(w * ratio)) { canvas.width = w * ratio; canvas.height = h * ratio; }
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, w, h);
-    const size = { w: w, h: h, unit: Math.min(w, 1.5 * h) * 2.4 };
+    const size = { w: w, h: h, unit: Math.min(w, 1.5 * h) * 2.9 };
     const at = [];
     for (let i = 0; i < given.points; i++) at.push(seen(point(i), size));
     const things = given.bones.map((bone, i) => ({

@@ -38,16 +38,16 @@ class Table:
 def tables_of(measured: Measured) -> list[Table]:
     """Every measure, and what changed where there is an earlier visit."""
     known = {(change.kind, change.about): change for change in measured.changes}
-    compared = measured.earlier is not None
-    return [_table(group, known, compared=compared) for group in grouped(measured.measures)]
+    return [_table(group, known) for group in grouped(measured.measures)]
 
 
-def _table(group: Group, known: dict[tuple[Kind, str], Change], *, compared: bool) -> Table:
+def _table(group: Group, known: dict[tuple[Kind, str], Change]) -> Table:
     kinds = _filled(group)
+    compared = any(judged(row, known) for row in group.rows)
     normal = any(m.norm is not None for row in group.rows for m in row.cells.values())
     columns = [_("Joint or posture"), *(kind_name(kind) for kind in kinds)]
     columns += [_("Normal")] if normal else []
-    columns += [_("Change")] if compared else []
+    columns += [_("Changed by")] if compared else []
     rows, marks = [], []
     for row in group.rows:
         changed = _changed(row, known)

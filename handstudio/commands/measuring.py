@@ -133,10 +133,11 @@ def show(found: Measured) -> None:
     out.print("± one standard uncertainty; docs/measures.md says what each measure is\n")
     known = {(change.kind, change.about): change for change in found.changes}
     for group in grouped(found.measures):
-        _show(group, known, compared=found.earlier is not None)
+        _show(group, known)
 
 
-def _show(group: Group, known: dict[tuple[Kind, str], Change], *, compared: bool) -> None:
+def _show(group: Group, known: dict[tuple[Kind, str], Change]) -> None:
+    compared = any(judged(row, known) for row in group.rows)
     normal = any(m.norm is not None for row in group.rows for m in row.cells.values())
     columns = ["", *(_COLUMNS[kind] for kind in group.kinds)]
     columns += ["normal"] if normal else []
