@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from handstudio.analysis.measure import Measure, missing
 from handstudio.analysis.series import AngleSeries
-from handstudio.analysis.stretches import unbroken
+from handstudio.analysis.unbroken import unbroken
 from handstudio.arrays import Array
 
 LEAST_RAD = float(np.deg2rad(10.0))

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import median_filter
 
-from handstudio.analysis.stretches import rate_of, unbroken
+from handstudio.analysis.unbroken import rate_of, unbroken
 from handstudio.arrays import Array
 
 HELD_S = 0.05

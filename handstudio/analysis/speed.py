@@ -9,7 +9,7 @@ from scipy.signal import savgol_filter
 from handstudio.analysis.extremes import extremes
 from handstudio.analysis.measure import Measure, WhyNot, missing
 from handstudio.analysis.series import AngleSeries, flexion_beside
-from handstudio.analysis.stretches import rate_of, unbroken
+from handstudio.analysis.unbroken import rate_of, unbroken
 from handstudio.arrays import Array
 
 WINDOW_S = 0.09

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from handstudio.analysis.measure import Measure, WhyNot, missing
 from handstudio.analysis.series import AngleSeries
-from handstudio.analysis.stretches import rate_of, unbroken
+from handstudio.analysis.unbroken import rate_of, unbroken
 from handstudio.arrays import Array
 
 WINDOW_S = 4.0

@@ -19,7 +19,7 @@ from handstudio.analysis.range_of_motion import ranges_of_motion
 from handstudio.analysis.series import AngleSeries
 from handstudio.analysis.smoothness import ldlj, smoothness_measures, sparc
 from handstudio.analysis.speed import speeds, velocity
-from handstudio.analysis.stretches import unbroken
+from handstudio.analysis.unbroken import unbroken
 from handstudio.analysis.tables import GROUPS, grouped, written
 from handstudio.analysis.tremor import spectrum_of, tremor_measures
 from handstudio.hand.pose import Pose, posed
