@@ -18,8 +18,8 @@ from handstudio.analysis.range_of_motion import ranges_of_motion, unmeasured
 from handstudio.analysis.series import AngleSeries, flexion_beside
 from handstudio.analysis.smoothness import smoothness_measures
 from handstudio.analysis.speed import speeds, velocity
-from handstudio.analysis.unbroken import rate_of
 from handstudio.analysis.tremor import spectrum_of, tremor_measures
+from handstudio.analysis.unbroken import rate_of
 from handstudio.arrays import Array
 from handstudio.hand.skeleton import SEGMENTS, HandSide
 from handstudio.hand_fit import fit_of

@@ -19,9 +19,9 @@ from handstudio.analysis.range_of_motion import ranges_of_motion
 from handstudio.analysis.series import AngleSeries
 from handstudio.analysis.smoothness import ldlj, smoothness_measures, sparc
 from handstudio.analysis.speed import speeds, velocity
-from handstudio.analysis.unbroken import unbroken
 from handstudio.analysis.tables import GROUPS, grouped, written
 from handstudio.analysis.tremor import spectrum_of, tremor_measures
+from handstudio.analysis.unbroken import unbroken
 from handstudio.hand.pose import Pose, posed
 from handstudio.hand.skeleton import FINGERS, SEGMENTS, nominal_skeleton
 from handstudio.maths import so3
