@@ -91,7 +91,9 @@ def _brief(row: Row) -> str:
     """The figures of a row without their uncertainties."""
     least, most = row.cells.get("least"), row.cells.get("most")
     if least is not None and most is not None:
-        return f"{_figure(least)} – {_figure(most)}°"
+        if least.value is None:
+            return f"– {why_words(least.why)}"
+        return _("{least} to {most}").format(least=_figure(least), most=_figure(most)) + "°"
     out = []
     for kind, measure in row.cells.items():
         if measure.value is None:
@@ -108,7 +110,7 @@ def _brief(row: Row) -> str:
 
 
 def _figure(measure: Measure) -> str:
-    return f"{measure.value or 0.0:.0f}".replace("-", "−")
+    return f"{round(measure.value or 0.0)}".replace("-", "−")
 
 
 def _table(table: Table) -> str:

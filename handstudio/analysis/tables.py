@@ -73,7 +73,7 @@ def written(measure: Measure) -> str:
     if measure.value is None:
         return "–"
     digits = digits_of(measure)
-    value = f"{measure.value:.{digits}f}".replace("-", "−")
+    value = f"{round(measure.value, digits) + 0.0:.{digits}f}".replace("-", "−")  # no minus zero
     if measure.sd is not None:
         return f"{value} ± {measure.sd:.{digits}f}"
     if measure.low is not None and measure.high is not None:
