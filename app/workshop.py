@@ -12,9 +12,12 @@ from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
+from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window
 from handstudio.measure import Measured
+from handstudio.pipeline import Motion
+from handstudio.process import process_head
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
@@ -33,6 +36,37 @@ class Uncomputed:
 
     take: Take
     error: HandstudioError
+
+
+@dataclass(frozen=True, slots=True)
+class Previewed:
+    """The first seconds of a take that is being computed."""
+
+    take: Take
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Surveyed:
+    """What wants a second look in this take, by its own setup or another."""
+
+    take: Take
+    setup: Setup | None
+    stretches: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What the sensors of this take told is there now."""
+
+    take: Take
+
+
+@dataclass(frozen=True, slots=True)
+class Trimmed:
+    """A part of a take is a take of its own."""
+
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +98,18 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = Computed | Uncomputed | Exported | MeasuredPart | Gathered | Solved
+Outcome = (
+    Computed
+    | Uncomputed
+    | Previewed
+    | Surveyed
+    | Written
+    | Trimmed
+    | Exported
+    | MeasuredPart
+    | Gathered
+    | Solved
+)
 
 
 @dataclass
@@ -106,6 +151,33 @@ class Workshop:
         words = smooth[not setup.smooth].format(name=take.path.stem)
         future = self.jobs.process(take.path, setup)
         self._pending.append(_Pending(future, lambda _result: Computed(take, setup), words, fail))
+
+    def preview(self, take: Take) -> None:
+        """The first seconds of a take, beside the computing of all of it."""
+        future = self._aside.submit(process_head, take)
+        words = _("Computing the motion of {name}").format(name=take.path.stem)
+        # behind what is waited for: its share is that of the whole
+        self._pending.append(_Pending(future, lambda motion: Previewed(take, motion), words))
+
+    def look_through(self, take: Take, setup: Setup | None) -> None:
+        """The stretches of a motion that is there already."""
+        words = _("Looking through {name}").format(name=take.path.stem)
+
+        def use(found: tuple[Stretch, ...]) -> Outcome:
+            return Surveyed(take, setup, found)
+
+        self._pending.append(_Pending(self.jobs.survey(take.path, setup), use, words))
+
+    def write_signals(self, take: Take) -> None:
+        """What the sensors of a take told."""
+        words = _("Reading the signals of {name}").format(name=take.path.stem)
+        future = self.jobs.signals(take.path)
+        self._pending.append(_Pending(future, lambda _result: Written(take), words))
+
+    def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> None:
+        """A part of a take as a take of its own."""
+        words = _("Trimming {name}").format(name=path.stem)
+        self._pending.append(_Pending(self.jobs.trim(path, begin_s, end_s, name), Trimmed, words))
 
     def export(
         self, path: Path, content: Content, window: Window, page: int, setup: Setup | None = None
