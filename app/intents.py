@@ -173,6 +173,21 @@ class ChooseCurves:
 
 
 @dataclass(frozen=True, slots=True)
+class AddTake:
+    """Copy a take from elsewhere into the library: a file here, or one that a page sent."""
+
+    name: str
+    content: bytes | None = None  # None: the name is a path of this computer
+
+
+@dataclass(frozen=True, slots=True)
+class ShareTake:
+    """Send the open take and its notes to the page, as one file."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
 class TrimTake:
     """The part of the open take that counts becomes a take of its own, called so."""
 
@@ -500,6 +515,8 @@ Intent: TypeAlias = (
     | FitPlots
     | ChooseCurves
     | TrimTake
+    | AddTake
+    | ShareTake
     | OpenTake
     | RecoverTake
     | ShowLive

@@ -32,6 +32,7 @@ from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
 from app.workshop import (
+    Added,
     Computed,
     Exported,
     Gathered,
@@ -53,6 +54,7 @@ from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
+    HeadingTaken,
     NotePage,
     Phase,
     ResetHeading,
@@ -199,6 +201,11 @@ class Studio:
                 self._export(intent)
             case intents.CompareVisits() | intents.MeasureHand() | intents.MakeReport():
                 self._measure(intent)
+            case intents.AddTake(name=name, content=content):
+                self._workshop.add(name, content, self.state.sessions)
+            case intents.ShareTake(page=page):
+                if self.state.review is not None:
+                    self._workshop.share(self.state.review.take, page)
             case intents.TrimTake(name=name):
                 self._trim(name)
             case intents.Smooth(on=on):
@@ -408,9 +415,6 @@ class Studio:
                 self._holder.use(which)
             case intents.ResetHeading(sensor=sensor):
                 self.capture.send(ResetHeading(sensor))
-                if self.state.newest.recorder is None:
-                    of = sensor or _("all sensors")
-                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
             case intents.OpenTake() | intents.ChooseSubject() | intents.DeleteSubject() if on:
                 raise HandstudioError(
                     "A course of calibration is on.", "Leave it first; it can be gone on with."
@@ -688,13 +692,17 @@ class Studio:
             shaking = shaken.heeded(shaking, motions)
         self.state = replace(self.state, newest=newest, live=live, shaking=shaking)
         for report in self.capture.reports():
-            if isinstance(report, TakeDone):
-                self._take_done(report.path)
-            else:
-                self._calibrator.take_failed(report)
-                self._sound(Sound.ALARM)
-                self._say(report)
-                self.refresh_takes()
+            match report:
+                case TakeDone(path=path):
+                    self._take_done(path)
+                case HeadingTaken(sensor=sensor):
+                    of = sensor or _("all sensors")
+                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
+                case HandstudioError():
+                    self._calibrator.take_failed(report)
+                    self._sound(Sound.ALARM)
+                    self._say(report)
+                    self.refresh_takes()
 
     def _take_done(self, path: Path) -> None:
         self.refresh_takes()
@@ -704,10 +712,13 @@ class Studio:
             _("Recorded {name}. Replay it below, export it under Review.").format(name=path.stem)
         )
         if self.state.newest.recorder is None:
-            try:
-                self._open(path)
-            except HandstudioError as error:
-                self._say(error)
+            self._open_or_say(path)
+
+    def _open_or_say(self, path: Path) -> None:
+        try:
+            self._open(path)
+        except HandstudioError as error:
+            self._say(error)
 
     def _finish_work(self) -> None:  # noqa: PLR0912 - a list
         for outcome in self._workshop.done():
@@ -722,6 +733,10 @@ class Studio:
                     self._ask_of_review()
                 case Previewed(take=take, motion=motion) if self.state.review is None:
                     self._show_head(take, motion)
+                case Added(path=path):
+                    self._tell(_("Added {name}.").format(name=path.stem))
+                    self.refresh_takes()
+                    self._open_or_say(path)
                 case Trimmed(path=path):
                     self._tell(_("Trimmed: {name} is a take of its own.").format(name=path.stem))
                     self.refresh_takes()

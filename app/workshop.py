@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -18,8 +19,13 @@ from handstudio.export.csv import Content, Window
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.process import process_head
+from handstudio.recording.parcel import SUFFIX, pack, take_in
+from handstudio.recording.raw_import import import_folder
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
+
+_IMPORTED = "imported"
+"""Whose takes raw folders are that do not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +76,13 @@ class Trimmed:
 
 
 @dataclass(frozen=True, slots=True)
+class Added:
+    """A take from elsewhere is in the library."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
 class Exported:
     """A file was written, and is wanted by a page."""
 
@@ -98,17 +111,8 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = (
-    Computed
-    | Uncomputed
-    | Previewed
-    | Surveyed
-    | Written
-    | Trimmed
-    | Exported
-    | MeasuredPart
-    | Gathered
-    | Solved
+Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written | MeasuredPart) | (
+    Trimmed | Added | Exported | Gathered | Solved
 )
 
 
@@ -178,6 +182,22 @@ class Workshop:
         """A part of a take as a take of its own."""
         words = _("Trimming {name}").format(name=path.stem)
         self._pending.append(_Pending(self.jobs.trim(path, begin_s, end_s, name), Trimmed, words))
+
+    def add(self, name: str, content: bytes | None, sessions: Path) -> None:
+        """A take from elsewhere."""
+        words = _("Copying {name}").format(name=Path(name).name)
+        future = self._aside.submit(_taken_in, name, content, sessions)
+        self._pending.append(_Pending(future, Added, words))
+
+    def share(self, take: Take, page: int) -> None:
+        """A take and its notes as one file."""
+        target = take.path.with_suffix(SUFFIX)
+
+        def use(written: Path) -> Outcome:
+            return Exported(Download(page, written.name, written))
+
+        words = _("Exporting {name}").format(name=target.name)
+        self._pending.append(_Pending(self._aside.submit(pack, take, target), use, words))
 
     def export(
         self, path: Path, content: Content, window: Window, page: int, setup: Setup | None = None
@@ -252,3 +272,16 @@ class Workshop:
                     reason=repr(error),
                 )
                 yield one.fail(failed)
+
+
+def _taken_in(name: str, content: bytes | None, sessions: Path) -> Path:
+    """A file or folder of this computer, or what a page sent, in the library."""
+    path = Path(name).expanduser()
+    if content is None:
+        return (
+            import_folder(path, sessions, _IMPORTED) if path.is_dir() else take_in(path, sessions)
+        )
+    with tempfile.TemporaryDirectory(prefix="handstudio-") as place:
+        sent = Path(place) / (path.name or "sent")
+        sent.write_bytes(content)
+        return take_in(sent, sessions)

@@ -46,6 +46,7 @@ class LibraryPanel:
         self._measures = MeasuresFolder(gui, send)
         self._notes = NotesFolder(gui, send)
         self._shelf = ShelfFolder(gui, send, self._selected)
+        self._elsewhere = ElsewhereFolder(gui, send)
         self._opened: Path | None = None
         self._search.on_update(typed(lambda text: send(intents.Search(text))))
         self._choice.on_update(typed(self._chosen))
@@ -77,6 +78,7 @@ class LibraryPanel:
         self._measures.render(state)
         self._notes.render(review)
         self._shelf.render(state)
+        self._elsewhere.render(review)
 
     def export(self, event: Any) -> None:
         """Send the open take's file to the page that asked."""
@@ -242,6 +244,40 @@ class NotesFolder:
             self._mark.options = options
         put(self._mark, visible=bool(self._marks))
         put(self._remove, visible=bool(self._marks))
+
+
+class ElsewhereFolder:
+    """Takes that come from another computer, or go there."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        with gui.add_folder(_("From elsewhere"), expand_by_default=False):
+            upload = gui.add_upload_button(
+                _("Add a take"),
+                icon=viser.Icon.UPLOAD,
+                color=QUIET,
+                hint=_("A file .mcap or .take.zip of your computer is copied into the library"),
+            )
+            path = gui.add_text(
+                _("or path"), "", hint=_("Of the studio's computer: a take, or a folder to import")
+            )
+            self._open = gui.add_button(_("Add from the path"), color=QUIET)
+            self._share = gui.add_button(
+                _("Share as one file"),
+                icon=viser.Icon.SHARE,
+                color=QUIET,
+                hint=_("The take with its notes, to be added elsewhere"),
+            )
+        upload.on_upload(
+            lambda event: send(intents.AddTake(event.target.value.name, event.target.value.content))
+        )
+        self._open.on_click(
+            lambda _event: send(intents.AddTake(path.value)) if path.value else None
+        )
+        self._share.on_click(lambda event: send(intents.ShareTake(page_of(event))))
+
+    def render(self, review: Review | None) -> None:
+        """Only an open take can be shared."""
+        put(self._share, disabled=review is None)
 
 
 class ShelfFolder:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -228,3 +230,30 @@ def test_a_take_is_looked_through_once(
     assert state.review is not None
     assert state.review.stretches is None
     assert len(ordered) == 1
+
+
+def test_a_take_is_shared_and_added_elsewhere(studio: Studio, path: Path) -> None:
+    opened(studio, path)
+    state = until(studio, intents.ShareTake(page=4), lambda state: state.downloads)
+    (download,) = state.downloads
+    assert download.page == 4
+    content = Path(download.content).read_bytes()  # type: ignore[arg-type]
+    state = until(
+        studio,
+        intents.AddTake("sent.take.zip", content),
+        lambda state: state.review is not None and state.review.take.path != path,
+    )
+    assert state.review is not None
+    assert state.review.take.path.name == "sent.mcap"
+    state = until(studio, intents.AddTake("/no/such/file"), lambda state: state.messages)
+    assert state.messages[0].alarm
+
+
+def until(studio: Studio, intent: intents.Intent, holds: Callable[[State], object]) -> State:
+    state = after(studio, intent)
+    for _ in range(500):
+        if holds(state):
+            return state
+        time.sleep(0.01)
+        state = studio.tick(TICK_S)
+    raise AssertionError("it did not happen")
