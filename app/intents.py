@@ -386,6 +386,25 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
+class CompareVisits:
+    """Compare the measures of the open take with those of an earlier one; None: with none."""
+
+    earlier: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureHand:
+    """Measure the part of the open take that counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class MakeReport:
+    """Write a report of the part that counts and send it to a page."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
 class Smooth:
     """Show the open take with its future taken in, or as it was live."""
 
@@ -510,6 +529,9 @@ Intent: TypeAlias = (
     | WholeTake
     | SetLoop
     | Export
+    | CompareVisits
+    | MeasureHand
+    | MakeReport
     | Smooth
     | Compare
     | FaceForward

@@ -10,10 +10,12 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
+from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
+from handstudio.measure import Measured, measure
 from handstudio.process import process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
@@ -64,6 +66,20 @@ class Jobs:
         """Write a CSV of a part of a take, by its own setup or another."""
         self._reset()
         return self._pool.submit(_export, path, target, content, window, setup)
+
+    def measure(
+        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None
+    ) -> Future[Measured]:
+        """Measure a part of a take, and compare with an earlier one."""
+        self._reset()
+        return self._pool.submit(_measure, path, window, setup, earlier)
+
+    def report(
+        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
+    ) -> Future[Path]:
+        """Write a report of a part of a take, beside it."""
+        self._reset()
+        return self._pool.submit(_report, path, window, setup, earlier, language)
 
     def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
         """Find the stretches of a take's motion that want a second look."""
@@ -145,6 +161,21 @@ def _export(
     chosen = setup or take.header.setup
     motion = process(take, chosen, progress=_tell)
     return export_csv(take, chosen, motion, target, content=content, window=window)
+
+
+def _measure(path: Path, window: Window, setup: Setup | None, earlier: Path | None) -> Measured:
+    before = None if earlier is None else open_take(earlier)
+    return measure(open_take(path), setup, window, earlier=before, progress=_tell)
+
+
+def _report(
+    path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
+) -> Path:
+    before = None if earlier is None else open_take(earlier)
+    made = report_of(
+        open_take(path), setup, window, earlier=before, language=language, progress=_tell
+    )
+    return save_report(made.html, report_path(path, language))
 
 
 def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:

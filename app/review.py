@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from app.seen import Choice, Seen, seen
 from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
+from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
@@ -46,6 +48,8 @@ class Review:
     smooth: bool = False  # somebody wants it smoothed; it is once that is computed
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
+    earlier: Path | None = None  # the take of an earlier visit that measures are held against
+    measured: Measured | None = None
     signals: Signals | None = None  # None: nobody has asked for them yet
     stretches: tuple[Stretch, ...] | None = None  # None: not known yet
     ordered: frozenset[str] = frozenset()  # which of these two are on their way
@@ -95,7 +99,7 @@ def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
     """The same take at the same place by another setup, compared with nothing yet."""
     new = opened(review.take, motion, setup)
     names = ["playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare"]
-    names += ["choice", "signals"]
+    names += ["choice", "signals", "earlier"]
     if not _is(review, 0.0, review.duration_s):
         names += ["from_s", "to_s"]
     same = {name: getattr(review, name) for name in names}

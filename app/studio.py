@@ -36,6 +36,7 @@ from app.workshop import (
     Computed,
     Exported,
     Gathered,
+    MeasuredPart,
     Previewed,
     Solved,
     Surveyed,
@@ -198,6 +199,8 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.CompareVisits() | intents.MeasureHand() | intents.MakeReport():
+                self._measure(intent)
             case intents.AddTake(name=name, content=content):
                 self._workshop.add(name, content, self.state.sessions)
             case intents.ShareTake(page=page):
@@ -641,6 +644,23 @@ class Studio:
         window = Window(review.in_s, review.out_s)
         self._workshop.export(review.take.path, order.content, window, order.page, review.used)
 
+    def _measure(
+        self, order: intents.CompareVisits | intents.MeasureHand | intents.MakeReport
+    ) -> None:
+        review = self.state.review
+        if review is None:
+            return
+        part = Window(review.in_s, review.out_s)
+        match order:
+            case intents.CompareVisits(earlier=earlier):
+                self.state = replace(
+                    self.state, review=replace(review, earlier=earlier, measured=None)
+                )
+            case intents.MeasureHand():
+                self._workshop.measure(review.take, part, review.used, review.earlier)
+            case intents.MakeReport(page=page):
+                self._workshop.report(review.take.path, part, page, review.used, review.earlier)
+
     def _trim(self, name: str) -> None:
         review = self.state.review
         if review is not None:
@@ -728,6 +748,8 @@ class Studio:
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
+                case MeasuredPart(take=take, measured=measured) if self._is_open(take):
+                    self._ask_of_review(measured=measured)
                 case Gathered(download=download):
                     self._send_file(download)
                 case Solved(answer=answer):

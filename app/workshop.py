@@ -12,10 +12,11 @@ from typing import Any
 from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
-from app.words import _
+from app.words import _, language
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window
+from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.process import process_head
 from handstudio.recording.parcel import SUFFIX, pack, take_in
@@ -88,6 +89,14 @@ class Exported:
 
 
 @dataclass(frozen=True, slots=True)
+class MeasuredPart:
+    """A part of this take was measured."""
+
+    take: Take
+    measured: Measured
+
+
+@dataclass(frozen=True, slots=True)
 class Gathered:
     """A file was made for a page, and is nowhere else."""
 
@@ -101,7 +110,7 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written) | (
+Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written | MeasuredPart) | (
     Trimmed | Added | Exported | Gathered | Solved
 )
 
@@ -200,6 +209,31 @@ class Workshop:
 
         words = _("Exporting {name}").format(name=target.name)
         future = self.jobs.export(path, target, content, window, setup)
+        self._pending.append(_Pending(future, use, words))
+
+    def measure(
+        self, take: Take, window: Window, setup: Setup | None, earlier: Path | None
+    ) -> None:
+        """A part of a take, by its own setup or another, against an earlier one."""
+        words = _("Measuring {name}").format(name=take.path.stem)
+        future = self.jobs.measure(take.path, window, setup, earlier)
+        self._pending.append(_Pending(future, lambda found: MeasuredPart(take, found), words))
+
+    def report(
+        self,
+        path: Path,
+        window: Window,
+        page: int,
+        setup: Setup | None = None,
+        earlier: Path | None = None,
+    ) -> None:
+        """A report of a part of a take, in the language that is spoken, for a page."""
+
+        def use(written: Path) -> Outcome:
+            return Exported(Download(page, written.name, written))
+
+        words = _("Writing the report of {name}").format(name=path.stem)
+        future = self.jobs.report(path, window, setup, earlier, language())
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:

@@ -138,7 +138,7 @@ def _opened(
     asked: Asked, samples: ImuSamples, trajectory: Trajectory, known: DeviceCalibration | None
 ) -> Swings:
     layout = glove(hand_type=asked.hand_type)
-    recorded = even([samples], RATE_HZ, known, layout.names)
+    recorded = even([samples], float(RATE_HZ), known, layout.names)
     free, labels = known is not None, _labels(trajectory)
     return opened(layout, float(RATE_HZ), recorded, labels, calibrated=free)
 

@@ -24,6 +24,7 @@ from handstudio.commands import keeping, sharing
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
+from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
 from handstudio.device import find
@@ -267,6 +268,55 @@ def export(
     return 0
 
 
+def report(
+    take: TakeFile,
+    *,
+    earlier: Path | None = None,
+    language: Literal["en", "ja"] = "en",
+    pdf: bool = False,
+    to: Path | None = None,
+    start_s: float = 0.0,
+    end_s: float | None = None,
+    smooth: bool = False,
+    calibration: str | None = None,
+    sensors: str | None = None,
+) -> int:
+    """Write a report: one HTML page with measures, plots, a replay and the calibration, offline.
+
+    Args:
+        take: The take.
+        earlier: A take of an earlier visit of the same hand, to compare with.
+        language: English or Japanese.
+        pdf: Also print it to PDF, by a Chromium, Chrome or Edge of this machine.
+        to: The file to write; beside the take unless given.
+        start_s: Begin of the part, seconds from the take's first instant.
+        end_s: End of the part; the end of the take unless given.
+        smooth: Take in what came after every instant as well: the tree filter's smoother.
+        calibration: File of another subject calibration than the take carries, or none.
+        sensors: File of another calibration of the sensors than the take carries, or none.
+    """
+    from app.report import make, pdf as printing  # noqa: PLC0415, I001 - speaks the page's languages
+
+    opened = open_take(take)
+    setup = calibration_commands.chosen(opened.header.setup, calibration, sensors)
+    if smooth:
+        setup = smoothing(setup)
+    with progress(take.name) as share:
+        made = make.report_of(
+            opened,
+            setup,
+            Window(start_s, end_s),
+            earlier=None if earlier is None else open_take(earlier),
+            language=language,
+            progress=share,
+        )
+    page = make.save_report(made.html, to or make.report_path(take, language))
+    out.print(str(page))
+    if pdf:
+        out.print(str(printing.save_pdf(page, page.with_suffix(".pdf"))))
+    return 0
+
+
 def import_(
     folder: Annotated[Path, tyro.conf.Positional],
     *,
@@ -352,6 +402,8 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "info": info,
     "process": process,
     "export": export,
+    "measure": measure,
+    "report": report,
     "import": import_,
     "recover": recover,
     "simulate": virtual_commands.simulate,

@@ -11,6 +11,7 @@ import viser
 from app import intents
 from app.comparison import OF_TAKE
 from app.panels.base import QUIET, Send, page_of, put, typed
+from app.panels.measures import MeasuresFolder
 from app.panels.sheets import ask_deletion, ask_emptying
 from app.review import Review
 from app.state import Shelf, State
@@ -42,6 +43,7 @@ class LibraryPanel:
         self._contents = _contents(hand=True)
         self._more = gui.add_dropdown(_("Contents"), tuple(self._contents), visible=False)
         self._motion = MotionFields(gui, send)
+        self._measures = MeasuresFolder(gui, send)
         self._notes = NotesFolder(gui, send)
         self._shelf = ShelfFolder(gui, send, self._selected)
         self._elsewhere = ElsewhereFolder(gui, send)
@@ -73,6 +75,7 @@ class LibraryPanel:
             if self._more.options != tuple(self._contents):
                 self._more.options = tuple(self._contents)
         self._motion.render(review, state.shelf.found)
+        self._measures.render(state)
         self._notes.render(review)
         self._shelf.render(state)
         self._elsewhere.render(review)

@@ -13,6 +13,7 @@ import pytest
 from app import intents
 from app import review as reviewing
 from app.jobs import Jobs
+from app.report.make import report_of, report_path, save_report
 from app.review import Review
 from app.state import State
 from app.studio import Studio
@@ -21,6 +22,7 @@ from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
 from handstudio.device.recorder import Recorder
 from handstudio.export.csv import Content, Window, export_csv
+from handstudio.measure import Measured, measure
 from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.header import Header
@@ -98,6 +100,23 @@ class PromptJobs:
         setup = setup or take.header.setup
         motion = process(take, setup)
         return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
+
+    def measure(
+        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None
+    ) -> Future[Measured]:
+        before = None if earlier is None else open_take(earlier)
+        return done(lambda: measure(open_take(path), setup, window, earlier=before))
+
+    def report(
+        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
+    ) -> Future[Path]:
+        before = None if earlier is None else open_take(earlier)
+
+        def work() -> Path:
+            made = report_of(open_take(path), setup, window, earlier=before, language=language)
+            return save_report(made.html, report_path(path, language))
+
+        return done(work)
 
 
 def done(work: Callable[[], Any]) -> Future[Any]:

@@ -1,0 +1,79 @@
+"""Measures of the open take: against what is usual and an earlier visit, and a report of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import viser
+
+from app import intents
+from app.panels.base import QUIET, Send, page_of, put, typed
+from app.state import State
+from app.views import measures as view
+from app.words import _
+from handstudio.measure import Measured
+
+
+class MeasuresFolder:
+    """Measure, look, and take a report along."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._send = send
+        self._folder = gui.add_folder(_("Measures"), expand_by_default=False, visible=False)
+        with self._folder:
+            self._earlier = gui.add_dropdown(
+                _("Earlier visit"),
+                (view.none_words(),),
+                hint=_("A take of the same hand to compare with"),
+            )
+            self._measure = gui.add_button(
+                _("Measure this part"), icon=viser.Icon.RULER_MEASURE, color=QUIET
+            )
+            self._short = gui.add_html("")
+            self._all = gui.add_button(
+                _("All measures"), icon=viser.Icon.TABLE, color=QUIET, visible=False
+            )
+            self._report = gui.add_button(
+                _("Report"),
+                icon=viser.Icon.REPORT,
+                hint=_("One page with measures, plots, a replay and the calibration, offline"),
+            )
+        self._sheet = gui.add_panel(visible=False)
+        with self._sheet.add_tab(_("Measures"), viser.Icon.RULER_MEASURE):
+            self._full = gui.add_html("")
+            self._close = gui.add_button(_("Close"), color=QUIET)
+        self._sheet.float(x=350.0, y=16.0, width=820.0, height=640.0)
+        self._takes: dict[str, Path] = {}
+        self._shown: Measured | None = None
+        self._earlier.on_update(
+            typed(lambda words: send(intents.CompareVisits(self._takes.get(words))))
+        )
+        self._measure.on_click(lambda _event: send(intents.MeasureHand()))
+        self._all.on_click(lambda _event: self._show_all())
+        self._close.on_click(lambda _event: put(self._sheet, visible=False))
+        self._report.on_click(lambda event: send(intents.MakeReport(page_of(event))))
+
+    def render(self, state: State) -> None:
+        """Show what was measured."""
+        review = state.review
+        put(self._folder, visible=review is not None)
+        if review is None or review.measured is None:
+            put(self._sheet, visible=False)
+        if review is None:
+            return
+        self._takes = view.earlier_takes(state)
+        options = (view.none_words(), *self._takes)
+        if self._earlier.options != options:
+            self._earlier.options = options
+        chosen = [words for words, path in self._takes.items() if path == review.earlier]
+        put(self._earlier, value=chosen[0] if chosen else view.none_words())
+        if review.measured is not self._shown:
+            self._shown = review.measured
+            put(self._sheet, visible=False)
+        put(self._short, content=view.short_html(review))
+        put(self._all, visible=review.measured is not None)
+
+    def _show_all(self) -> None:
+        if self._shown is not None:
+            put(self._full, content=view.full_html(self._shown))
+            put(self._sheet, visible=True)

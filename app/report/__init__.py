@@ -1,0 +1,1 @@
+"""A report: one page that opens anywhere, offline, with everything that was measured of a take."""

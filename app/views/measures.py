@@ -1,0 +1,133 @@
+"""Measures as the page shows them: in brief beside the hand, in full on a sheet. Pure."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+
+from app.report.names import about_name, grade_word, why_words
+from app.report.tables import Table, is_short, tables_of
+from app.review import Review
+from app.state import State
+from app.views.pieces import AMBER, GREEN
+from app.words import _
+from handstudio.analysis.change import Change
+from handstudio.analysis.measure import Kind, Measure
+from handstudio.analysis.tables import Row, grouped, judged
+from handstudio.measure import Measured
+
+
+def none_words() -> str:
+    """What is chosen where nothing is compared."""
+    return _("none")
+
+
+def earlier_takes(state: State) -> dict[str, Path]:
+    """Takes of the hand of the open one that were recorded before it, newest first, by words."""
+    review = state.review
+    if review is None:
+        return {}
+    header = review.take.header
+    found = [
+        entry
+        for entry in state.shelf.takes
+        if entry.take is not None
+        and entry.take.header.subject == header.subject
+        and entry.take.header.setup.layout.side == header.setup.layout.side
+        and entry.take.header.start_utc_ns < header.start_utc_ns
+    ]
+    found.sort(key=lambda entry: entry.take.header.start_utc_ns if entry.take else 0, reverse=True)
+    return {f"{entry.visit} · {entry.name}": entry.path for entry in found}
+
+
+def short_html(review: Review) -> str:
+    """Ranges and scores, one line each, and whether they are of the part that counts now."""
+    measured = review.measured
+    if measured is None:
+        return ""
+    visit = measured.visit
+    known = {(change.kind, change.about): change for change in measured.changes}
+    part = _("part {begin:.1f} to {end:.1f} s").format(begin=visit.start_s, end=visit.end_s)
+    told = [f'<div style="opacity:.75;padding:.2em 0">{html.escape(part)}</div>']
+    if abs(visit.start_s - review.in_s) > _APART_S or abs(visit.end_s - review.end_s) > _APART_S:
+        other = _("Another part counts now: measure again.")
+        told.append(f'<div style="color:{AMBER}">{html.escape(other)}</div>')
+    rows = [
+        _line(row, known)
+        for group in grouped(measured.measures)
+        if group.name in ("range", "scores", "opposition")
+        for row in group.rows
+    ]
+    told.append(f'<table style="{_TABLE}">{"".join(rows)}</table>')
+    return f'<div style="padding:0 .75em;font-size:.8rem;line-height:1.35">{"".join(told)}</div>'
+
+
+def full_html(measured: Measured) -> str:
+    """Every table."""
+    tables = [_table(table) for table in tables_of(measured)]
+    return f'<div style="padding:.2em 1em 1em;font-size:.85rem">{"".join(tables)}</div>'
+
+
+_APART_S = 0.05
+_TABLE = "border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums"
+_CELL = "padding:.1em .5em .1em 0;vertical-align:top"
+
+
+def _line(row: Row, known: dict[tuple[Kind, str], Change]) -> str:
+    said, colour = _brief(row), AMBER if is_short(row) else ""
+    beyond = [c for c in judged(row, known) if c.verdict in ("more", "less")]
+    sign = ""
+    if beyond:
+        sign = "▲" if any(c.verdict == "more" for c in beyond) else "▼"
+    style = f"color:{colour}" if colour else ""
+    return (
+        f'<tr style="{style}"><td style="{_CELL}">{html.escape(about_name(row.about))}</td>'
+        f'<td style="{_CELL};white-space:nowrap">{html.escape(said)}</td>'
+        f'<td style="color:{GREEN}">{sign}</td></tr>'
+    )
+
+
+def _brief(row: Row) -> str:
+    """The figures of a row without their uncertainties."""
+    least, most = row.cells.get("least"), row.cells.get("most")
+    if least is not None and most is not None:
+        if least.value is None:
+            return f"– {why_words(least.why)}"
+        return _("{least} to {most}").format(least=_figure(least), most=_figure(most)) + "°"
+    out = []
+    for kind, measure in row.cells.items():
+        if measure.value is None:
+            out.append(f"– {why_words(measure.why)}")
+        elif kind == "kapandji":
+            out.append(f"Kapandji {_figure(measure)}")
+        else:
+            name = {"tam": "TAM ", "strickland": "Str. "}.get(kind, "")
+            unit = {"deg": "°", "%": " %"}.get(measure.unit, "")
+            out.append(" ".join(filter(None, [f"{name}{_figure(measure)}{unit}"])))
+            if kind == "tam":
+                out[-1] += f" {grade_word(measure.grade)}"
+    return ", ".join(out)
+
+
+def _figure(measure: Measure) -> str:
+    return f"{round(measure.value or 0.0)}".replace("-", "−")
+
+
+def _table(table: Table) -> str:
+    head = "".join(f'<th style="{_HEAD}">{html.escape(each)}</th>' for each in table.columns)
+    body = "".join(
+        f'<tr style="{_MARKED.get(mark, "")}">'
+        + "".join(f'<td style="{_WIDE}">{html.escape(cell)}</td>' for cell in row)
+        + "</tr>"
+        for row, mark in zip(table.rows, table.marks, strict=True)
+    )
+    return (
+        f'<h3 style="margin:1em 0 .1em;font-size:1rem">{html.escape(table.title)}</h3>'
+        f'<div style="opacity:.75">{html.escape(table.note)}</div>'
+        f'<div style="overflow-x:auto"><table style="{_TABLE}"><tr>{head}</tr>{body}</table></div>'
+    )
+
+
+_HEAD = "text-align:left;padding:.3em 1em .3em 0;border-bottom:1px solid currentColor"
+_WIDE = "padding:.15em 1em .15em 0;white-space:nowrap"
+_MARKED = {"short": f"color:{AMBER}", "changed": f"color:{GREEN}"}

@@ -1,0 +1,82 @@
+"""Measuring the open take on the page, and a report of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from app import intents
+from app.review import Review
+from app.state import State
+from app.studio import Studio
+from app.views import measures as view
+from handstudio.measure import measure
+from handstudio.recording.simulated import rehearse, simulate
+from handstudio.recording.take import Take
+
+from .conftest import after
+
+
+@pytest.fixture
+def opened(studio: Studio) -> Studio:
+    """Two takes of one person, the later one open."""
+    for seed in (1, 2):
+        simulate(studio.state.sessions, rehearse(seed=seed), seconds=4.0, name=f"take {seed}")
+    studio.refresh_takes()
+    later = max(
+        (entry for entry in studio.state.shelf.takes if entry.take is not None),
+        key=lambda entry: entry.take.header.start_utc_ns,
+    )
+    after(studio, intents.OpenTake(later.path))
+    studio.tick(0.1)
+    assert studio.state.review is not None
+    return studio
+
+
+def reviewed(state: State) -> Review:
+    assert state.review is not None
+    return state.review
+
+
+def test_a_part_is_measured_and_shown(opened: Studio) -> None:
+    after(opened, intents.Seek(1.0), intents.MarkIn(), intents.MeasureHand())
+    review = reviewed(opened.tick(0.1))
+    assert review.measured is not None
+    assert review.measured.visit.start_s == pytest.approx(1.0)
+    html = view.short_html(review)
+    assert "Index PIP flexion" in html
+    assert "Another part counts now" not in html
+    moved = reviewed(after(opened, intents.WholeTake()))
+    assert "Another part counts now" in view.short_html(moved)
+
+
+def test_an_earlier_take_of_the_hand_can_be_compared_with(opened: Studio) -> None:
+    (words,) = view.earlier_takes(opened.state)
+    assert words.endswith("take_1")
+    after(opened, intents.CompareVisits(view.earlier_takes(opened.state)[words]))
+    after(opened, intents.MeasureHand())
+    review = reviewed(opened.tick(0.1))
+    assert review.measured is not None
+    assert review.measured.earlier is not None
+    assert "no detectable change" in view.full_html(review.measured)
+    assert reviewed(after(opened, intents.CompareVisits(None))).measured is None
+
+
+def test_a_report_comes_to_the_page_that_asked(opened: Studio) -> None:
+    (download,) = after(opened, intents.MakeReport(7)).downloads
+    assert download.page == 7
+    assert download.name.endswith(".report.en.html")
+    assert not isinstance(download.content, bytes)
+    assert "Report of a hand" in download.content.read_text(encoding="utf-8")
+
+
+def test_without_a_take_nothing_is_measured(studio: Studio) -> None:
+    state = after(studio, intents.MeasureHand(), intents.MakeReport(1), intents.CompareVisits(None))
+    assert state.review is None
+    assert state.messages == ()
+    assert view.earlier_takes(state) == {}
+
+
+def test_rows_of_a_measured_take_are_told_with_their_reasons(take: Take, review: Review) -> None:
+    html = view.full_html(measure(take))
+    assert "needs a calibration of the hand" in html
+    assert view.short_html(review) == ""
