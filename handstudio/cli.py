@@ -25,6 +25,7 @@ from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
+from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
@@ -341,6 +342,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "info": info,
     "process": process,
     "export": export,
+    "trace": trace,
     "import": import_,
     "recover": recover,
     "simulate": virtual_commands.simulate,
