@@ -23,6 +23,7 @@ from handstudio.commands import keeping
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
+from handstudio.commands.grasping import grasps
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
 from handstudio.commands.writing import trace
@@ -343,6 +344,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "process": process,
     "export": export,
     "trace": trace,
+    "grasps": grasps,
     "import": import_,
     "recover": recover,
     "simulate": virtual_commands.simulate,
