@@ -10,10 +10,11 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
+from app.found import Found, found_in
 from app.solving import Answer, solve
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
-from handstudio.process import process
+from handstudio.process import kept_motion, process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
 
@@ -60,6 +61,11 @@ class Jobs:
         """Write a CSV of a part of a take, by its own setup or another."""
         self._reset()
         return self._pool.submit(_export, path, target, content, window, setup)
+
+    def look_through(self, path: Path, setup: Setup) -> Future[Found]:
+        """Look for what was written and grasped in the motion of a take, where that is kept."""
+        self._reset()
+        return self._pool.submit(_look_through, path, setup)
 
     def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
         """Compute what a course is for from its takes, and keep what is to be used from now on."""
@@ -114,6 +120,11 @@ def _export(
     chosen = setup or take.header.setup
     motion = process(take, chosen, progress=_tell)
     return export_csv(take, chosen, motion, target, content=content, window=window)
+
+
+def _look_through(path: Path, setup: Setup) -> Found:
+    motion = kept_motion(open_take(path), setup)
+    return Found() if motion is None else found_in(setup, motion)
 
 
 def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from app.channels import sds_of, values_of
 from app.comparison import Comparison, compared, picked, seconds_of
+from app.found import Found
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.pipeline import Motion
@@ -42,6 +43,7 @@ class Review:
     smooth: bool = False  # somebody wants it smoothed; it is once that is computed
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
+    found: Found = Found()  # what was written and grasped, once that is looked for
 
     @property
     def setup(self) -> Setup:

@@ -29,7 +29,15 @@ from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Solved, Uncomputed, Workshop
+from app.workshop import (
+    Computed,
+    Exported,
+    Gathered,
+    LookedThrough,
+    Solved,
+    Uncomputed,
+    Workshop,
+)
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
@@ -512,6 +520,7 @@ class Studio:
             motion = self._motion_by(review.take, wanted)
             if motion is not None:
                 review = reviewing.computed_by(review, wanted, motion)
+                self._workshop.look_through(review.take, review.setup)
         if not review.compare:
             review = replace(review, comparison=None)
         elif review.comparison is None or review.comparison.name != review.compare:
@@ -534,6 +543,7 @@ class Studio:
         except HandstudioError as error:
             self._say(error)
         self.state = replace(self.state, review=replace(review, notes=notes), yaw=None)
+        self._workshop.look_through(review.take, review.setup)
 
     def _reopen(self, before: Path, path: Path) -> None:
         """A take that is open stays open where it is, under its other name."""
@@ -629,6 +639,10 @@ class Studio:
                     self._send_file(download)
                 case Gathered(download=download):
                     self._send_file(download)
+                case LookedThrough(take=take, setup=setup, found=found):
+                    review = self.state.review
+                    if review is not None and self._is_open(take) and review.setup == setup:
+                        self.state = replace(self.state, review=replace(review, found=found))
                 case Solved(answer=answer):
                     self._solving = False
                     self._calibrator.solved(answer)

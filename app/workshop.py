@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from app.found import Found
 from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
@@ -55,7 +56,16 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = Computed | Uncomputed | Exported | Gathered | Solved
+@dataclass(frozen=True, slots=True)
+class LookedThrough:
+    """What was written and grasped in a take is known now, as its motion by this setup tells."""
+
+    take: Take
+    setup: Setup
+    found: Found
+
+
+Outcome = Computed | Uncomputed | Exported | Gathered | Solved | LookedThrough
 
 
 @dataclass
@@ -97,6 +107,16 @@ class Workshop:
         words = smooth[not setup.smooth].format(name=take.path.stem)
         future = self.jobs.process(take.path, setup)
         self._pending.append(_Pending(future, lambda _result: Computed(take, setup), words, fail))
+
+    def look_through(self, take: Take, setup: Setup) -> None:
+        """What was written and grasped in a take."""
+
+        def use(found: Found) -> Outcome:
+            return LookedThrough(take, setup, found)
+
+        words = _("Looking for writing and grasps in {name}").format(name=take.path.stem)
+        future = self.jobs.look_through(take.path, setup)
+        self._pending.append(_Pending(future, use, words))
 
     def export(
         self, path: Path, content: Content, window: Window, page: int, setup: Setup | None = None

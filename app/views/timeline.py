@@ -7,6 +7,7 @@ import html
 import numpy as np
 
 from app.review import Review
+from app.views.written import grasp_words
 from app.words import _
 from handstudio.pipeline import Motion
 
@@ -33,9 +34,16 @@ def as_svg(review: Review) -> str:
     for mark in review.notes.marks:
         title = f"{mark.text or unnamed} {mark.at_s:.2f} s"
         parts.append(_bar(_around(at(mark.at_s), 1.5), (4, 20), "#fcd34d", 1.0, title))
+    for grasp in review.found.grasps:
+        segment = grasp.segment
+        moving = (at(segment.start_s), at(segment.end_s))
+        holding = (at(segment.hold_s), at(segment.release_s))
+        title = f"{grasp_words(grasp)} {segment.hold_s:.2f}-{segment.release_s:.2f} s"
+        parts.append(_bar(moving, (26, 5), "#8b5cf6", 0.35, title))
+        parts.append(_bar(holding, (26, 5), "#8b5cf6", 0.9, title))
     parts.append(_bar(_around(at(review.at_s), 1.0), (2, 24), "currentColor", 1.0))
     return (
-        f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} 28" height="28" '
+        f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} 32" height="32" '
         f'width="100%" preserveAspectRatio="none">{"".join(parts)}</svg></div>'
     )
 
