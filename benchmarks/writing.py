@@ -137,6 +137,8 @@ def compared(writing: Writing, followed: Followed, held: Things, span: Span) -> 
     each = []
     for character in characters:
         now = down & (writing.time_s >= character.start_s) & (writing.time_s <= character.end_s)
+        if now.sum() < 2:  # the pen was lost before
+            continue
         each.append(trace_error(writing.flat[now], true[now, :2]).rmse_m)
     return {
         "rmse_mm": 1e3 * whole.rmse_m,

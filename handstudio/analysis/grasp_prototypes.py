@@ -2,8 +2,8 @@
 
 Classes: M. Cutkosky, IEEE Trans. Robotics and Automation 5 (1989) 269, figure 4, the heavy wraps
 apart; names of T. Feix et al., IEEE Trans. Human-Machine Systems 46 (2016) 66. Angles are means
-over development subjects 1 and 2 of the simulator, four grasps a class, one of the usual size and
-three of sizes all over the class's range (``python -m benchmarks.grasps --design``).
+over development subjects 1 to 3 of the simulator, nine grasps a class, a third of the usual size
+and the others of sizes all over the class's range (``python -m benchmarks.grasps --design``).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ ANGLES = (
 """Names of the angles of a posture, in their order."""
 
 SD_DEG = (
-    6, 8, 8, 8, 8, 8, 8, 9, 8, 7, 7,
-    8, 8, 7, 8, 8, 7, 7, 8, 8, 7, 7,
+    6, 9, 8, 8, 8, 8, 8, 9, 8, 7, 8,
+    8, 8, 7, 8, 8, 8, 7, 8, 8, 8, 7,
 )  # fmt: skip
 """How much each varies within a class, and 6 degrees for people we have not seen."""
 
@@ -56,82 +56,82 @@ PROTOTYPES = (
     Prototype(
         "heavy_wrap_large",
         "Large Diameter",
-        (-3, 0, 47, 17, 36, 28, 21, 10, 45, 20, 40, 3, 47, 31, 36, 1, 45, 28, 32, -1, 35, 21),
+        (-2, 1, 48, 18, 37, 27, 23, 11, 45, 21, 40, 3, 47, 30, 36, 0, 45, 28, 33, 0, 35, 21),
     ),
     Prototype(
         "heavy_wrap_small",
         "Small Diameter",
-        (-3, -4, 33, 0, 47, 55, 75, 7, 73, 43, 85, 1, 73, 46, 73, -4, 73, 50, 66, 1, 61, 36),
+        (-3, -3, 31, 0, 47, 55, 76, 5, 74, 44, 84, 0, 75, 47, 73, -3, 74, 51, 66, 1, 62, 36),
     ),
     Prototype(
         "medium_wrap",
         "Medium Wrap",
-        (-3, -3, 41, 18, 46, 59, 51, 0, 64, 28, 66, 1, 63, 41, 53, 3, 60, 41, 43, -8, 50, 29),
+        (-2, -1, 40, 18, 46, 58, 51, 3, 65, 29, 64, 0, 63, 40, 53, 3, 60, 40, 44, -7, 50, 29),
     ),
     Prototype(
         "adducted_thumb",
         "Adducted Thumb",
-        (-2, -4, 8, 4, 6, 7, 46, -12, 55, 37, 55, 6, 67, 46, 50, -2, 68, 46, 51, -1, 58, 40),
+        (-1, -4, 8, 4, 6, 7, 47, -12, 56, 38, 54, 5, 68, 46, 51, -1, 69, 47, 52, -1, 59, 40),
     ),
     Prototype(
         "light_tool",
         "Light Tool",
-        (2, -2, 20, 19, 51, 72, 67, -17, 84, 58, 74, -6, 88, 59, 56, 5, 88, 59, 52, -2, 68, 46),
+        (4, -3, 20, 19, 51, 72, 68, -16, 82, 57, 73, -6, 87, 58, 55, 4, 88, 59, 51, -2, 67, 45),
     ),
     Prototype(
         "thumb_4_finger",
         "Prismatic 4 Finger",
-        (15, 8, 39, 18, 37, 30, 61, 3, 34, 22, 68, 4, 38, 26, 53, 2, 38, 27, 53, -3, 25, 15),
+        (15, 6, 39, 18, 37, 29, 62, 3, 34, 22, 68, 4, 38, 25, 53, 1, 39, 26, 53, -3, 24, 15),
     ),
     Prototype(
         "thumb_3_finger",
         "Prismatic 3 Finger",
-        (9, 7, 38, 18, 32, 28, 59, 4, 31, 21, 67, 3, 35, 22, 54, -1, 34, 22, 35, 0, 71, 47),
+        (9, 8, 37, 18, 32, 28, 60, 4, 32, 21, 66, 4, 35, 22, 54, -1, 34, 22, 34, 0, 71, 47),
     ),
     Prototype(
         "thumb_2_finger",
         "Prismatic 2 Finger",
-        (0, 7, 37, 18, 31, 28, 61, 4, 30, 22, 67, 4, 35, 22, 34, 1, 70, 47, 34, -1, 71, 47),
+        (0, 7, 36, 18, 32, 28, 61, 4, 30, 22, 67, 5, 34, 22, 34, 1, 70, 47, 34, -1, 71, 47),
     ),
     Prototype(
         "thumb_index_finger",
         "Palmar Pinch",
-        (0, 7, 13, 5, 30, 29, 50, 0, 41, 27, 34, -1, 71, 48, 35, 0, 73, 48, 36, 0, 71, 48),
+        (0, 7, 14, 7, 30, 28, 50, 1, 42, 27, 34, -1, 70, 48, 36, 0, 72, 48, 36, 0, 71, 48),
     ),
     Prototype(
         "power_disk",
         "Power Disk",
-        (-3, -10, 10, 16, 33, 39, 15, 10, 66, 45, 15, 6, 72, 49, 12, 12, 70, 49, 11, -1, 64, 43),
+        (-3, -8, 9, 16, 31, 38, 16, 9, 64, 43, 15, 6, 68, 47, 13, 10, 66, 46, 12, -1, 60, 41),
     ),
     Prototype(
         "power_sphere",
         "Power Sphere",
-        (-1, 7, 37, 11, 32, 32, 40, 7, 51, 34, 44, -2, 50, 29, 33, -1, 48, 31, 36, 0, 49, 31),
+        (0, 8, 37, 11, 32, 31, 41, 6, 52, 34, 43, 0, 50, 29, 33, -2, 48, 31, 37, -1, 48, 31),
     ),
     Prototype(
         "precision_disk",
         "Precision Disk",
-        (2, 5, 28, 6, 17, 23, 43, 9, 38, 26, 45, 3, 36, 24, 37, 2, 35, 23, 36, -6, 31, 22),
+        (4, 6, 28, 6, 17, 23, 44, 8, 39, 26, 44, 3, 36, 23, 37, 1, 35, 24, 36, -6, 31, 21),
     ),
     Prototype(
         "precision_sphere",
         "Precision Sphere",
-        (7, 13, 35, 7, 20, 25, 52, 3, 38, 25, 53, 3, 39, 26, 41, -2, 38, 26, 43, -12, 24, 16),
+        (8, 14, 35, 8, 21, 25, 53, 3, 38, 25, 53, 3, 38, 25, 40, -2, 38, 27, 42, -12, 25, 16),
     ),
     Prototype(
         "tripod",
         "Tripod",
-        (0, 11, 30, 10, 18, 21, 58, 3, 26, 17, 61, 10, 31, 22, 36, 0, 71, 48, 33, 0, 70, 48),
+        (0, 11, 30, 10, 18, 21, 59, 3, 26, 17, 60, 10, 31, 21, 35, 0, 70, 48, 33, 0, 70, 48),
     ),
     Prototype(
         "platform_push",
         "",
-        (-1, -18, 9, 1, 1, 12, -2, 3, 3, 1, -2, 1, 4, 3, 0, 2, 3, 2, -1, 5, 3, 3),
+        (-1, -16, 10, 1, 1, 10, -2, 3, 3, 1, -1, 1, 4, 3, 0, 2, 3, 2, -1, 4, 3, 3),
     ),
     Prototype(
         "lateral_pinch",
         "Lateral",
-        (0, 9, 15, 6, 16, 27, 48, 0, 68, 44, 45, 0, 65, 43, 46, -2, 65, 42, 46, 1, 65, 43),
+        (0, 9, 15, 7, 16, 27, 48, 1, 68, 44, 45, 0, 65, 43, 45, -2, 65, 42, 46, 1, 65, 44),
     ),
 )
 """In the order of Cutkosky's figure: power before precision, prismatic before circular."""

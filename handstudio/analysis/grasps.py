@@ -17,7 +17,7 @@ from handstudio.analysis.grasp_prototypes import ANGLES, OPEN, PROTOTYPES, SD_DE
 from handstudio.arrays import Array
 
 _ALIKE = 4.0  # angles go together: so many tell as much as one that is alone; ours
-_STRANGE = 6.0  # mean square in these units: no class at all
+_STRANGE = 2.6  # mean square in these units: no class at all, such as a hand that writes
 _STILL_RAD_S = 0.12  # root mean square over angles
 _SMOOTHED_S = 0.05
 _SHORTEST_S = 0.5

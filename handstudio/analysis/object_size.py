@@ -3,7 +3,7 @@
 A finger is a bone with flesh around it; where a thing touches it, the bone's line passes the
 surface at the flesh's thickness, wherever along the bone and round it that is. So the thing's
 radius and place are those that make all these distances right, in the sense of least squares.
-Flesh gives way where it is pressed.
+That flesh gives way where it is pressed is left out.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from handstudio.maths import so3
 
 Form: TypeAlias = Literal["sphere", "cylinder"]
 
-_YIELDS_M = 0.0006  # how far flesh gives way in a hold
 _TILT_SD, _EXACT_M = np.deg2rad(12.0), 0.001  # of a bar across the palm; of a distance
 _INSTANTS = 15  # of a hold that are looked at
 _OUT_M = (0.0, 0.015, 0.03)  # below the middle of the bones: where the search starts
@@ -89,7 +88,7 @@ def object_size(
         return None
     form, segments = TOUCHING[name]
     index = [SEGMENTS.index(segment) for segment in segments]
-    flesh = half_depths(hand_length_m)[index] - _YIELDS_M
+    flesh = half_depths(hand_length_m)[index]
     ends = skeleton.t_far_end[index]
     if _PALM in segments:
         ends[segments.index(_PALM)] = skeleton.t_parent_joint[_HEADS].mean(axis=0)

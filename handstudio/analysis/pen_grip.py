@@ -29,11 +29,11 @@ HOLDING = ("thumb", "index", "middle")
 # palm round to the thumb's side): the middle finger lies below, with its side. Ours.
 _ALONG, _TOWARDS_DEG = (0.65, 0.65, 0.65), (0.0, 0.0, 45.0)
 _PAD_SD_M = 0.003  # how far off that is, errors of links and attitudes included
-_RIGID_SD_M, _COUNTED = 0.0002, 50.0  # of a distance between them; instants that tell as one fit
+_RIGID_SD_M, _COUNTED = 0.0005, 50.0  # of a distance between them; instants that tell as one fit
 _FITTED = 300  # instants at most
 
-_NEAR_M = 0.030  # between the points of two fingers on one pen, at most
-_STEADY_M, _STEADY_S = 0.004, 0.5  # how much that changes within so long
+_NEAR_M = 0.040  # between the points of two fingers on one pen, at most
+_STEADY_M, _STEADY_S = 0.008, 0.5  # how much that changes within so long
 _SHORTEST_S = 2.0
 _SIDES = ((0, 1), (1, 2), (0, 2))
 
@@ -161,7 +161,7 @@ def placements(
 
 
 def _shape(points: Array) -> Array:
-    """Mean shape of three points that hardly move against one another, about their middle."""
+    """Mean shape of points that hardly move against one another, about their middle."""
     own = points[len(points) // 2] - points[len(points) // 2].mean(axis=0)
     for _ in range(3):
         attitude, middle = placements(points, own)

@@ -17,7 +17,7 @@ from handstudio.arrays import Array
 
 _TIP_M, _TIP_SD_M = 0.030, 0.003  # from the contacts to the tip, and how sure we are; ours
 _LEVEL_SD, _TILT_SD = np.deg2rad([2.0, 10.0])  # of a desk; of the first guess of another plane
-_BETTER = 1.15  # a plane that is no desk must have so many times as much written on it
+_BETTER = 1.5  # a plane that is no desk must have so many times as much written on it
 _SCALES_M = (*(4e-3,) * 5, *(2e-3,) * 5, *(1e-3,) * 5, *(5e-4,) * 10)  # what is near, step by step
 _SD_M, _COUNTED = 0.0005, 50.0  # of a height on paper; instants that tell as one fit
 _STEEPEST = np.cos(np.deg2rad(60.0))
