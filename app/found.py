@@ -34,5 +34,6 @@ class Found:
 def found_in(setup: Setup, motion: Motion) -> Found:
     """All of it; nothing of what the layout cannot tell."""
     writings = writings_in(setup, motion) if can_tell_writing(setup.layout) else []
-    grasps = grasps_in(setup, motion) if can_tell_grasps(setup.layout) else []
-    return Found(tuple(writings), tuple(grasps))
+    if not can_tell_grasps(setup.layout):
+        return Found(tuple(writings))
+    return Found(tuple(writings), tuple(grasps_in(setup, motion, writings=writings)))

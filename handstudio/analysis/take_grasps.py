@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from handstudio.analysis.grasp_prototypes import ANGLES
 from handstudio.analysis.grasps import GraspSegment, grasp_segments
 from handstudio.analysis.object_size import ObjectSize, object_size
+from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.hand.angles import Angle, hand_angles
@@ -41,9 +43,16 @@ def can_tell_grasps(layout: Layout) -> bool:
 
 
 def grasps_in(
-    setup: Setup, motion: Motion, start_us: int | None = None, fit: HandFit | None = None
+    setup: Setup,
+    motion: Motion,
+    start_us: int | None = None,
+    fit: HandFit | None = None,
+    writings: Sequence[Writing] = (),
 ) -> list[TakenGrasp]:
     """Every grasp of a motion; times in seconds from ``start_us``, or from the first instant.
+
+    While something is written (``writings``, on the same time axis) the pen is what is held: that
+    is none of these classes.
 
     Raises:
         TakeError: the layout lacks sensors to tell.
@@ -59,7 +68,12 @@ def grasps_in(
     begin_us = int(motion.time_us[0]) if start_us is None else start_us
     time_s = (motion.time_us - begin_us) * 1e-6
     segments = grasp_segments(time_s, _postures(setup, motion, fit))
-    return [TakenGrasp(one, _size(setup, motion, time_s, fit, one)) for one in segments]
+    writes = [(float(w.time_s[0]), float(w.time_s[-1])) for w in writings]
+    return [
+        TakenGrasp(one, _size(setup, motion, time_s, fit, one))
+        for one in segments
+        if not any(one.hold_s < end and one.release_s > start for start, end in writes)
+    ]
 
 
 def _wanted(layout: Layout) -> list[Angle | None]:

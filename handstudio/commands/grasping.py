@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from handstudio.analysis.take_grasps import TakenGrasp, grasps_in
+from handstudio.analysis.take_writing import can_tell_writing, writings_in
 from handstudio.commands.arguments import Json, TakeFile
 from handstudio.commands.calibration import chosen
 from handstudio.export.csv import Window, cut
@@ -41,7 +42,9 @@ def grasps(
         setup, _ = aligned_setup(opened, setup)
     with progress(take.name, quiet=json) as share:
         motion = process_take(opened, setup, progress=share)
-    found = grasps_in(setup, cut(motion, Window(start_s, end_s)), int(motion.time_us[0]))
+    part, begin_us = cut(motion, Window(start_s, end_s)), int(motion.time_us[0])
+    writings = writings_in(setup, part, begin_us) if can_tell_writing(setup.layout) else []
+    found = grasps_in(setup, part, begin_us, writings=writings)
     rows = [told(grasp) for grasp in found]
     if json:
         print_json(rows)
