@@ -12,11 +12,15 @@ from pathlib import Path
 
 from app.found import Found, found_in
 from app.solving import Answer, solve
+from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.process import kept_motion, process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
+from handstudio.signals import signals
+from handstudio.survey import survey
+from handstudio.trim import trim
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
 _share: Synchronized[float] | None = None
@@ -62,10 +66,25 @@ class Jobs:
         self._reset()
         return self._pool.submit(_export, path, target, content, window, setup)
 
-    def look_through(self, path: Path, setup: Setup) -> Future[Found]:
+    def find(self, path: Path, setup: Setup) -> Future[Found]:
         """Look for what was written and grasped in the motion of a take, where that is kept."""
         self._reset()
-        return self._pool.submit(_look_through, path, setup)
+        return self._pool.submit(_find, path, setup)
+
+    def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
+        """Find the stretches of a take's motion that want a second look."""
+        self._reset()
+        return self._pool.submit(_survey, path, setup)
+
+    def signals(self, path: Path) -> Future[None]:
+        """Write what the sensors of a take told: choosing it then finds it."""
+        self._reset()
+        return self._pool.submit(_signals, path)
+
+    def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> Future[Path]:
+        """Make a take of a part of one."""
+        self._reset()
+        return self._pool.submit(_trim, path, begin_s, end_s, name)
 
     def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
         """Compute what a course is for from its takes, and keep what is to be used from now on."""
@@ -113,6 +132,18 @@ def _process(path: Path, setup: Setup | None) -> None:
     process(open_take(path), setup, progress=_tell)
 
 
+def _survey(path: Path, setup: Setup | None) -> tuple[Stretch, ...]:
+    return survey(open_take(path), setup, _tell)
+
+
+def _signals(path: Path) -> None:
+    signals(open_take(path), _tell)
+
+
+def _trim(path: Path, begin_s: float, end_s: float | None, name: str) -> Path:
+    return trim(open_take(path), begin_s, end_s, name=name, progress=_tell)
+
+
 def _export(
     path: Path, target: Path, content: Content, window: Window, setup: Setup | None
 ) -> Path:
@@ -122,7 +153,7 @@ def _export(
     return export_csv(take, chosen, motion, target, content=content, window=window)
 
 
-def _look_through(path: Path, setup: Setup) -> Found:
+def _find(path: Path, setup: Setup) -> Found:
     motion = kept_motion(open_take(path), setup)
     return Found() if motion is None else found_in(setup, motion)
 

@@ -57,6 +57,7 @@ class Settings(msgspec.Struct, frozen=True):
         hand_length_mm: Of a subject whose hand was not measured.
         plot_span_s: How much time live plots show.
         filter: Name of the live filter; empty: whatever suits the device.
+        curves: Name of the set of curves that is plotted.
     """
 
     language: str = ""
@@ -73,6 +74,7 @@ class Settings(msgspec.Struct, frozen=True):
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3
     plot_span_s: float = 10.0
     filter: str = ""
+    curves: str = "overview"
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

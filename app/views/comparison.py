@@ -34,7 +34,8 @@ def compared_ghost(state: State) -> GhostView | None:
 
 def comparison_words(comparison: Comparison) -> str:
     """What is pale in the picture and dashed in the plots."""
-    return _("pale and dashed: {name}").format(name=choices()[comparison.name])
+    name = comparison.take or choices()[comparison.name]
+    return _("pale and dashed: {name}").format(name=name)
 
 
 def _turned(pose: Pose, yaw: float) -> Pose:

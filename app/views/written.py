@@ -39,8 +39,10 @@ class TraceView:
 def trace_view(state: State) -> TraceView | None:
     """The writing that is going on, or was last; None: there is none."""
     review = state.review
-    writing = None if review is None else review.found.writing_at(review.at_s)
-    if review is None or writing is None:
+    if review is None or review.found is None:
+        return None
+    writing = review.found.writing_at(review.at_s)
+    if writing is None:
         return None
     both = writing.down[1:] & writing.down[:-1] & (writing.time_s[1:] <= review.at_s)
     points = writing.on_plane
@@ -52,7 +54,7 @@ def trace_view(state: State) -> TraceView | None:
 
 def trace_picture(review: Review) -> str:
     """The page seen from above: what is written by now is dark, what is to come is pale."""
-    writing = review.found.writing_at(review.at_s)
+    writing = None if review.found is None else review.found.writing_at(review.at_s)
     if writing is None:
         return ""
     low, high = _box(writing)
