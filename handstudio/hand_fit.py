@@ -49,6 +49,8 @@ class HandFit:
 def fit_of(setup: Setup) -> HandFit:
     """The hand a setup describes: the calibrated one, else mean proportions of its length.
 
+    The same object for the same setup, as long as it is among those asked about last.
+
     Raises:
         LayoutError: the layout is not a hand's.
     """
@@ -59,7 +61,7 @@ def fit_of(setup: Setup) -> HandFit:
             why=setup.layout.no_hand,
         )
     if setup.subject is not None:
-        return fit_of_calibration(setup.subject, setup.layout)
+        return _calibrated(_Same(setup))
     side: HandSide = "left" if setup.layout.side == "left" else "right"
     skeleton = nominal_skeleton(side, setup.hand.hand_length_m, setup.layout.hand_type)
     return HandFit(skeleton, nominal_mounting(setup.layout))
@@ -124,6 +126,13 @@ class _Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and other.setup is self.setup
+
+
+@lru_cache(maxsize=16)
+def _calibrated(same: _Same) -> HandFit:
+    setup = same.setup
+    assert setup.subject is not None
+    return fit_of_calibration(setup.subject, setup.layout)
 
 
 @lru_cache(maxsize=16)

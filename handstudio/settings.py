@@ -32,7 +32,7 @@ QUIET_S = 1.0
 class Shown(msgspec.Struct, frozen=True):
     """What of the hand is drawn."""
 
-    skin: bool = False
+    skin: bool = True
     bones: bool = True
     sensors: bool = True
     axes: bool = False

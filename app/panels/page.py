@@ -178,6 +178,7 @@ def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
         (_("Seen from the back"), "3", intents.SetView(View.BACK)),
         (_("Seen from the thumb"), "4", intents.SetView(View.THUMB)),
         (_("Follow the hand"), "5", intents.SetView(View.FOLLOW)),
+        (_("Show or hide the skin"), "G", intents.ToggleShown("skin")),
         (_("Show or hide bones"), "B", intents.ToggleShown("bones")),
         (_("Show or hide sensors"), "S", intents.ToggleShown("sensors")),
         (_("Show or hide sensor axes"), "X", intents.ToggleShown("axes")),

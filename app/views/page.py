@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from app.channels import OF_TAKES, SIGNALS, Plot, plots_of, sets_of
 from app.live import SPAN_S
-from app.look import Camera, View, camera_for, course_camera
+from app.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lowered
 from app.state import State
 from app.views.comparison import comparison_words
 from app.views.health import worst_of
@@ -161,8 +161,10 @@ def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
     if state.guided is not None and state.view is View.DESK:
         return course_camera(state.guided.course.layout.side, near=looks_near(state))
     if isinstance(view, HandView):
-        return camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
-    return camera_for(state.view, None, None, 0.0)
+        camera = camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
+    else:
+        camera = camera_for(state.view, None, None, 0.0)
+    return camera if state.review is None else lowered(camera, ABOVE_SHEET)
 
 
 def curves_of(state: State) -> Curves | None:

@@ -72,6 +72,7 @@ def test_a_second_hand_is_shown_with_its_curves_and_by_how_much_they_differ(
     assert curves.second.shape == curves.values.shape
     assert ghost is not None
     assert not ghost.beside
+    assert choices()[name] in ghost.words
     assert choices()[name] in caption_of(state)
     if kept.header.setup.filter == FILTERS.get(name):
         assert (curves.rms == 0.0).all(), "with itself"
