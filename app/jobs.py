@@ -10,13 +10,14 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
+from app.found import Found, found_in
 from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.csv import Content, Window, export_csv
 from handstudio.measure import Measured, measure
-from handstudio.process import process
+from handstudio.process import kept_motion, process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
 from handstudio.signals import signals
@@ -80,6 +81,11 @@ class Jobs:
         """Write a report of a part of a take, beside it."""
         self._reset()
         return self._pool.submit(_report, path, window, setup, earlier, language)
+
+    def find(self, path: Path, setup: Setup) -> Future[Found]:
+        """Look for what was written and grasped in the motion of a take, where that is kept."""
+        self._reset()
+        return self._pool.submit(_find, path, setup)
 
     def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
         """Find the stretches of a take's motion that want a second look."""
@@ -176,6 +182,11 @@ def _report(
         open_take(path), setup, window, earlier=before, language=language, progress=_tell
     )
     return save_report(made.html, report_path(path, language))
+
+
+def _find(path: Path, setup: Setup) -> Found:
+    motion = kept_motion(open_take(path), setup)
+    return Found() if motion is None else found_in(setup, motion)
 
 
 def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from app.comparison import Comparison, compared, seconds_of
+from app.found import Found
 from app.seen import Choice, Seen, seen
 from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
@@ -52,7 +53,8 @@ class Review:
     measured: Measured | None = None
     signals: Signals | None = None  # None: nobody has asked for them yet
     stretches: tuple[Stretch, ...] | None = None  # None: not known yet
-    ordered: frozenset[str] = frozenset()  # which of these two are on their way
+    found: Found | None = None  # what was written and grasped; None: not known yet
+    ordered: frozenset[str] = frozenset()  # which of these are on their way
     partial: bool = False  # only the first seconds are there yet
 
     @property

@@ -8,11 +8,13 @@ import viser
 from app import colours
 from app.boards import BOARD_M, Boards, boards_of
 from app.bones import BoneSet, bone_sets, hand_length, joint_radii
+from app.ink import InkNodes
 from app.look import DESK_TARGET, Camera
 from app.meshes import mesh
 from app.skin import SkinNodes
 from app.views.course import GhostView
 from app.views.page import HandView, SensorsView
+from app.views.written import TraceView
 from handstudio.arrays import Array
 from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton
 from handstudio.layout import Layout
@@ -42,6 +44,7 @@ class Scene:
         self._hand = _HandNodes(server)
         self._skin = SkinNodes(server, "/hand/skin")
         self._ghost = _GhostNodes(server)
+        self._ink = InkNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
         self._dark: bool | None = None
@@ -68,6 +71,10 @@ class Scene:
     def render_ghost(self, view: GhostView | None, shown: Shown) -> None:
         """Show the hand that shows what is asked for, or none."""
         self._ghost.render(view, shown)
+
+    def render_trace(self, view: TraceView | None) -> None:
+        """Show what is written by now, or nothing."""
+        self._ink.render(view)
 
     def say(self, words: str) -> None:
         """Words in the middle of the picture; none: nothing."""

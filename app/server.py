@@ -20,6 +20,7 @@ from app.studio import Studio
 from app.views.comparison import compared_ghost
 from app.views.course import ghost_view
 from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
+from app.views.written import trace_view
 from app.words import _
 
 HOST = "127.0.0.1"
@@ -126,6 +127,7 @@ class Server:
         self._scene.render(view, state.yaw, state.settings.shown)
         ghost = ghost_view(state) or compared_ghost(state)
         self._scene.render_ghost(ghost, state.settings.shown)
+        self._scene.render_trace(trace_view(state))
         self._scene.say(overlay_of(state))
         # aimed when asked for, when a take is opened or left, and when the picture is turned
         # otherwise or a hand appears: from the desk all that looks the same

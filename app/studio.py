@@ -35,6 +35,7 @@ from app.workshop import (
     Added,
     Computed,
     Exported,
+    FoundIn,
     Gathered,
     MeasuredPart,
     Previewed,
@@ -583,7 +584,9 @@ class Studio:
             if stretches is None:
                 stretches = kept_survey(review.take, review.setup)
             self._order(review, chosen == SIGNALS and signals is None, stretches is None)
-        ordered = review.ordered
+            if review.found is None and "found" not in review.ordered:
+                self._workshop.find(review.take, review.setup)
+        ordered = review.ordered if review.partial else review.ordered | {"found"}
         if not review.partial:
             ordered |= {"stretches", "signals"} if chosen == SIGNALS else {"stretches"}
         choice = Choice(chosen, sensor)
@@ -752,6 +755,10 @@ class Studio:
                     self._ask_of_review(measured=measured)
                 case Gathered(download=download):
                     self._send_file(download)
+                case FoundIn(take=take, setup=setup, found=found):
+                    review = self.state.review
+                    if review is not None and self._is_open(take) and review.setup == setup:
+                        self.state = replace(self.state, review=replace(review, found=found))
                 case Solved(answer=answer):
                     self._solving = False
                     self._calibrator.solved(answer)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from app.found import Found
 from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
@@ -110,8 +111,17 @@ class Solved:
     answer: Answer | HandstudioError
 
 
+@dataclass(frozen=True, slots=True)
+class FoundIn:
+    """What was written and grasped in a take is known now, as its motion by this setup tells."""
+
+    take: Take
+    setup: Setup
+    found: Found
+
+
 Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written | MeasuredPart) | (
-    Trimmed | Added | Exported | Gathered | Solved
+    FoundIn | Trimmed | Added | Exported | Gathered | Solved
 )
 
 
@@ -154,6 +164,16 @@ class Workshop:
         words = smooth[not setup.smooth].format(name=take.path.stem)
         future = self.jobs.process(take.path, setup)
         self._pending.append(_Pending(future, lambda _result: Computed(take, setup), words, fail))
+
+    def find(self, take: Take, setup: Setup) -> None:
+        """What was written and grasped in a take."""
+
+        def use(found: Found) -> Outcome:
+            return FoundIn(take, setup, found)
+
+        words = _("Looking for writing and grasps in {name}").format(name=take.path.stem)
+        future = self.jobs.find(take.path, setup)
+        self._pending.append(_Pending(future, use, words))
 
     def preview(self, take: Take) -> None:
         """The first seconds of a take, beside the computing of all of it."""

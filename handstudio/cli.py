@@ -24,9 +24,11 @@ from handstudio.commands import keeping, sharing
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
+from handstudio.commands.grasping import grasps
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
 from handstudio.commands.readings import show_verdicts
+from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
@@ -404,6 +406,8 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "export": export,
     "measure": measure,
     "report": report,
+    "trace": trace,
+    "grasps": grasps,
     "import": import_,
     "recover": recover,
     "simulate": virtual_commands.simulate,

@@ -12,6 +12,7 @@ from app.review import SPEEDS, Review
 from app.state import State
 from app.views import timeline
 from app.views.recording import clock_of
+from app.views.written import grasp_words, trace_picture
 from app.words import _
 
 _STEP_S = 0.01
@@ -24,6 +25,7 @@ class TransportPanel:
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab(_("Replay"), viser.Icon.TIMELINE):
             self._strip = gui.add_html("")
+            self._written_page = gui.add_html("", visible=False)
             self._time = gui.add_slider(_("Time [s]"), 0.0, 1.0, _STEP_S, 0.0)
             self._clock = gui.add_markdown("")
             self._moves = gui.add_button_group(
@@ -88,6 +90,8 @@ class TransportPanel:
             return
         self._render_time(review)
         put(self._strip, content=timeline.as_svg(review))
+        picture = trace_picture(review)
+        put(self._written_page, content=picture, visible=bool(picture))
         put(self._clock, content=_here(review))
         if review.playing != self._playing:
             self._playing = review.playing
@@ -122,7 +126,8 @@ def _here(review: Review) -> str:
         here += " · " + _("part {begin} to {end}").format(
             begin=clock_of(review.in_s), end=clock_of(review.end_s)
         )
-    return here
+    grasp = None if review.found is None else review.found.grasp_at(review.at_s)
+    return here if grasp is None else f"{here} · {grasp_words(grasp)}"
 
 
 def _on_choice(

@@ -6,14 +6,16 @@ import html
 from collections.abc import Iterator
 
 from app.review import Review
+from app.views.written import grasp_words
 from app.words import _
 from handstudio.analysis.stretches import Stretch, StretchKind
 
 _WIDTH = 1000.0  # of the drawing; the page stretches it
 
-# lanes from above: notes, the take itself, what is missing or doubted, what can hardly be
+# lanes from above: notes, the take itself, what is missing or doubted, what can hardly be, grasps
 _NOTED, _TAKE, _DATA, _HARDLY = (4, 7), (14, 8), (25, 5), (32, 5)
-_HEIGHT = 40
+_GRASPS = (39, 5)
+_HEIGHT = 47
 
 _COLOURS: dict[StretchKind, str] = {
     "gap": "#e5484d",
@@ -70,6 +72,11 @@ def _parts(review: Review) -> Iterator[str]:
     for mark in review.notes.marks:
         title = f"{mark.text or unnamed} {mark.at_s:.2f} s"
         yield _bar(_around(at(mark.at_s), 1.5), (2, 22), "#fcd34d", 1.0, title)
+    for grasp in review.found.grasps if review.found else ():
+        segment = grasp.segment
+        title = f"{grasp_words(grasp)} {segment.hold_s:.2f}-{segment.release_s:.2f} s"
+        yield _bar((at(segment.start_s), at(segment.end_s)), _GRASPS, "#12b5cb", 0.35, title)
+        yield _bar((at(segment.hold_s), at(segment.release_s)), _GRASPS, "#12b5cb", 0.9, title)
     yield _bar(_around(at(review.at_s), 1.0), (0, _HEIGHT), "currentColor", 1.0)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
+from handstudio.hand import flesh
 from handstudio.hand.angles import DEVIATION, FLEXION, ROTATION, joint_index
 from handstudio.hand.skeleton import JOINTS, PARENTS, SEGMENTS
 from handstudio.maths import so3
@@ -154,9 +155,7 @@ def skin(
 
 def outwards(subject: Subject, towards_deg: float = 0.0) -> Float[Array, "3"]:
     """Out of the skin there, in the segment's frame."""
-    radial = -1.0 if subject.side == "right" else 1.0
-    angle = np.deg2rad(towards_deg)
-    return np.array([radial * np.sin(angle), 0.0, -np.cos(angle)])
+    return flesh.outwards(subject.side, towards_deg)
 
 
 def limits(subject: Subject) -> tuple[Float[Array, " c"], Float[Array, " c"]]:

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
+from handstudio.hand.flesh import half_depths
 from handstudio.hand.skeleton import (
     ADULT_HAND_LENGTH_M,
     FINGERS,
@@ -54,11 +55,6 @@ _ROLLING_M = {"mcp": 0.0010, "pip": 0.0008, "dip": 0.0006, "ip": 0.0008}  # per 
 _CONJUNCT_SD = 0.03  # rad of deviation or rotation per rad of flexion, in finger joints
 _COUPLING_SD = 0.08
 _LIMIT_SD = 0.07  # of a range of motion
-
-# Half of a segment's thickness: bone centre to palm skin, in hand lengths; ours, from adult
-# finger depths of 12 to 20 mm and a palm of 28 mm.
-_HALF_DEPTH = {"forearm": 0.16, "hand": 0.075, "hand_ulnar": 0.070, "thumb_metacarpal": 0.065}
-_HALF_DEPTH_OF_PHALANX = {"proximal": 0.048, "intermediate": 0.044, "distal": 0.040}
 
 # Turns [deg] by joint: flexion from, to; deviation from, to (ulnar and, for the thumb, to the palm
 # positive). The normal active ranges of hand/CONVENTIONS.md; ours where those are silent.
@@ -112,7 +108,7 @@ def ideal_subject(side: HandSide = "right", hand_length_m: float = ADULT_HAND_LE
         ideal_mechanism(),
         np.full(4, DIP_PER_PIP),
         _ranges(),
-        _half_depths() * hand_length_m,
+        half_depths(hand_length_m),
     )
 
 
@@ -234,12 +230,3 @@ def _ranges() -> Array:
     kinds = [_RANGE.get(j.name) or _RANGE[j.name.rpartition("_")[2]] for j in JOINTS]
     ranges: Array = np.deg2rad(np.array(kinds, dtype=float))
     return ranges
-
-
-def _half_depths() -> Array:
-    return np.array(
-        [
-            _HALF_DEPTH.get(name) or _HALF_DEPTH_OF_PHALANX[name.rpartition("_")[2]]
-            for name in SEGMENTS
-        ]
-    )

@@ -12,6 +12,7 @@ import pytest
 
 from app import intents
 from app import review as reviewing
+from app.found import Found, found_in
 from app.jobs import Jobs
 from app.report.make import report_of, report_path, save_report
 from app.review import Review
@@ -86,6 +87,9 @@ class PromptJobs:
 
     def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
         return done(lambda: survey(open_take(path), setup))
+
+    def find(self, path: Path, setup: Setup) -> Future[Found]:
+        return done(lambda: found_in(setup, process(open_take(path), setup)))
 
     def signals(self, path: Path) -> Future[None]:
         return done(lambda: signals(open_take(path)))
