@@ -12,7 +12,9 @@ from pathlib import Path
 
 from app.solving import Answer, solve
 from handstudio.errors import HandstudioError
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import format_named
+from handstudio.export.part import Content, Processed, Window
 from handstudio.process import process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
@@ -55,11 +57,16 @@ class Jobs:
         return self._pool.submit(_process, path, setup)
 
     def export(
-        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+        self,
+        path: Path,
+        name: str,
+        content: Content | None,
+        window: Window,
+        setup: Setup | None = None,
     ) -> Future[Path]:
-        """Write a CSV of a part of a take, by its own setup or another."""
+        """Write a part of a take in a format, beside it, by its own setup or another."""
         self._reset()
-        return self._pool.submit(_export, path, target, content, window, setup)
+        return self._pool.submit(_export, path, name, content, window, setup)
 
     def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
         """Compute what a course is for from its takes, and keep what is to be used from now on."""
@@ -108,12 +115,14 @@ def _process(path: Path, setup: Setup | None) -> None:
 
 
 def _export(
-    path: Path, target: Path, content: Content, window: Window, setup: Setup | None
+    path: Path, name: str, content: Content | None, window: Window, setup: Setup | None
 ) -> Path:
-    take = open_take(path)
-    chosen = setup or take.header.setup
-    motion = process(take, chosen, progress=_tell)
-    return export_csv(take, chosen, motion, target, content=content, window=window)
+    take, chosen = open_take(path), format_named(name)
+    by = setup or take.header.setup
+    source = Processed(take, by, process(take, by, progress=_tell))
+    kind = chosen.content(content, by.layout)
+    target = chosen.target(path, kind)
+    return export(source, target, chosen, content=kind, window=window, progress=_tell)
 
 
 def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:

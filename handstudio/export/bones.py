@@ -5,13 +5,12 @@ Of each segment, in the order of `SEGMENTS`; the frames are y up (`y_up`), lengt
 
 from __future__ import annotations
 
-import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
+from handstudio.export.y_up import turned_points
 from handstudio.hand.skeleton import DISTALS, PARENTS, SEGMENTS, Skeleton
 from handstudio.maths import so3
-from handstudio.export.y_up import turned_points
 
 CHILDREN = tuple(
     tuple(child for child, parent in enumerate(PARENTS) if parent == segment)

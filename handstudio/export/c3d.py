@@ -51,7 +51,9 @@ def write(part: Part, file: BinaryIO) -> None:
 
 def _header(frames: Frames, start: int) -> bytes:
     first, last = (min(number, _MOST) for number in _first_and_last(frames))
-    words = struct.pack("<BB5HfHHf", 2, _KEY, len(POINTS), 0, first, last, 0, -1.0, start, 0, frames.rate_hz)
+    words = struct.pack(
+        "<BB5HfHHf", 2, _KEY, len(POINTS), 0, first, last, 0, -1.0, start, 0, frames.rate_hz
+    )
     return words.ljust(_BLOCK, b"\0")
 
 

@@ -10,12 +10,12 @@ import msgspec
 
 from handstudio.export import metadata
 from handstudio.export.formats import Format
-from handstudio.export.part import Content, Part, Source, Window, cut
+from handstudio.export.part import Content, Part, Processed, Window, cut
 from handstudio.export.whole import written_whole
 
 
 def export(
-    source: Source,
+    source: Processed,
     target: Path,
     chosen: Format,
     *,

@@ -58,7 +58,7 @@ class Format:
         if not layout.is_hand and chosen not in _WITHOUT_A_HAND:
             raise TakeError(
                 "This take has no joint angles or positions. {why}",
-                "Export orientations instead (csv, parquet, sto, mcap): they hold every sensor, and "
+                "Export orientations instead (csv, parquet, sto, mcap): they hold every sensor, "
                 "tables also the rotation across each joint.",
                 why=layout.no_hand,
             )
@@ -101,7 +101,14 @@ FORMATS: dict[str, Format] = {
         Format("sto", ("orientations",), opensim.write_sto, axes=f"{_OURS} ({opensim.TO_OPENSIM})"),
         Format("trc", ("positions",), trc.write, axes=f"{_OURS}; millimetres", even=True),
         Format("c3d", ("positions",), c3d.write, axes=f"{_OURS}; millimetres", even=True),
-        Format("bvh", ("skeleton",), bvh.write, axes=f"{_Y_UP}; centimetres", even=True, fills_gaps=True),
+        Format(
+            "bvh",
+            ("skeleton",),
+            bvh.write,
+            axes=f"{_Y_UP}; centimetres",
+            even=True,
+            fills_gaps=True,
+        ),
         Format("glb", ("skeleton",), glb.write, axes=f"{_Y_UP}; metres", fills_gaps=True),
         Format("mcap", ("motion",), mcap.write, axes=f"{_OURS}; metres", ending=VIEW),
         Format("svg", ("angles",), svg.write),

@@ -129,8 +129,9 @@ def _keys(part: Part) -> tuple[Array, Array]:
     steps = np.diff(time_us)
     usual = int(np.median(steps))
     after = np.flatnonzero(steps > _JUMP * usual) + 1
-    which, shown_us = np.insert(which, after, after - 1), np.insert(
-        time_us, after, time_us[after] - usual
+    which, shown_us = (
+        np.insert(which, after, after - 1),
+        np.insert(time_us, after, time_us[after] - usual),
     )
     return which, seconds(shown_us)
 
@@ -140,12 +141,8 @@ def _animate(document: Document, time_s: Array) -> list[int]:
     times = document.add(time_s)
     outputs = [document.reserve(len(time_s), 4) for _ in NODES]
     samplers = [{"input": times, "output": output} for output in outputs]
-    channels = [
-        {"sampler": node, "target": {"node": node, "path": "rotation"}} for node in NODES
-    ]
-    document.about["animations"] = [
-        {"name": "motion", "samplers": samplers, "channels": channels}
-    ]
+    channels = [{"sampler": node, "target": {"node": node, "path": "rotation"}} for node in NODES]
+    document.about["animations"] = [{"name": "motion", "samplers": samplers, "channels": channels}]
     return outputs
 
 

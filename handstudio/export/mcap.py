@@ -157,9 +157,7 @@ def _message(name: str, fields: list[str]) -> Any:
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"handstudio.{name}"))
 
 
-def _describe(
-    file: FileDescriptor, into: descriptor_pb2.FileDescriptorSet, seen: set[str]
-) -> None:
+def _describe(file: FileDescriptor, into: descriptor_pb2.FileDescriptorSet, seen: set[str]) -> None:
     """A file of kinds of messages and, before it, those it needs."""
     if file.name in seen:
         return

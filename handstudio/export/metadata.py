@@ -74,6 +74,7 @@ def of_part(setup: Setup, motion: Motion, start_us: int, content: str) -> dict[s
         "window_s": [time_s[0], time_s[-1]],
         "instants": len(motion),
         "measured_rate_hz": _measured_rate(motion),
+        "missing": missing(setup, motion),
         "gaps_s": _gaps(motion, time_s),
         "doubtful_s": _doubtful(setup, motion, time_s),
     }
@@ -85,6 +86,26 @@ def of_part(setup: Setup, motion: Motion, start_us: int, content: str) -> dict[s
     if content in ("positions", "skeleton", "motion") and setup.layout.is_hand:
         fields["origin"] = "the elbow, assumed still: its place cannot be observed"
     return fields
+
+
+def missing(setup: Setup, motion: Motion) -> list[str]:
+    """What a reader might look for and not find, in English sentences; also why."""
+    told = []
+    if not setup.layout.is_hand:
+        told.append(setup.layout.missing_for_hand)
+    elif setup.subject is None:
+        told.append(
+            "No calibration of the wearer: sensors are taken to sit squarely on their segments, "
+            "the hand to have mean proportions."
+        )
+    if setup.layout.is_hand and not has_start(motion):
+        told.append(
+            "No rest from which elbow_flexion and forearm_pronation could count: they are absent."
+        )
+    if gaps := _gaps(motion, _seconds(motion.time_us - motion.time_us[:1])):
+        gone = sum(end - begin for begin, end in gaps)
+        told.append(f"{len(gaps)} gaps, {gone:.2f} s in all: nothing is filled in for them.")
+    return told
 
 
 def _subject_made(setup: Setup) -> dict[str, Any] | None:

@@ -48,7 +48,7 @@ def known(part: Part) -> Array:
     """Whether all wanted angles are known at an instant: those from the start are not before it."""
     if not {angle.name for angle in part.angles} & set(ROOT_ANGLES):
         return np.ones(len(part.motion), dtype=bool)
-    finite: Array = np.isfinite(part.motion.q_world_start).all(axis=1)
+    finite: Array = np.isfinite(part.motion.q_world_start[:, 0])
     return finite
 
 

@@ -19,7 +19,9 @@ from handstudio.pipeline import Motion
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
-Content: TypeAlias = Literal["angles", "orientations", "segments", "positions", "skeleton", "motion"]
+Content: TypeAlias = Literal[
+    "angles", "orientations", "segments", "positions", "skeleton", "motion"
+]
 """What of a motion a file holds; ``skeleton``: how segments turn on each other, ``motion``: that
 and angles, of sensors where there is no hand."""
 
@@ -36,7 +38,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Source:
+class Processed:
     """A take and its motion by a setup."""
 
     take: Take

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from handstudio.arrays import Array
-from handstudio.colours import of_part
+from handstudio.colours import INDEX, LITTLE, MIDDLE, RING, THUMB, of_part
 from handstudio.errors import TakeError
 from handstudio.export.metadata import CONVENTION
 from handstudio.export.part import Part
@@ -18,9 +18,12 @@ from handstudio.kinematics import angles_of
 _COLUMNS = 1500
 """Instants of a curve at most, twice: of more only the least and the greatest are drawn."""
 
+_PLOT_IN, _EDGES_IN = 1.9, 1.2
+"""Height of a plot, and above and below all of them [inches]."""
+
 _JUMP = 1.5  # usual steps: over a longer one no line is drawn
-_SHADES = {"deviation_ulnar": "--", "abduction": "--", "rotation": ":", "pronation": "--"}
-"""Curves of one finger are told apart by their dashes."""
+_CYCLE = (INDEX, THUMB, MIDDLE, LITTLE, RING)
+"""Colours of curves that are not one a finger."""
 
 
 def write(part: Part, file: BinaryIO) -> None:
@@ -43,17 +46,19 @@ def write(part: Part, file: BinaryIO) -> None:
     time_s, degrees = _curves(part, angles)
     groups = _groups(angles)
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "handstudio"}):
-        figure = Figure(figsize=(10, 1.2 + 2.2 * len(groups)), layout="constrained")
+        high = _EDGES_IN + _PLOT_IN * len(groups)
+        figure = Figure(figsize=(10.0, high))
         FigureCanvasSVG(figure)
         plots = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+        edge = 0.5 * _EDGES_IN / high
+        figure.subplots_adjust(left=0.07, right=0.8, top=1.0 - edge, bottom=edge, hspace=0.3)
         for plot, (title, columns) in zip(plots, groups.items(), strict=True):
-            for column in columns:
-                name = angles[column].name
-                colour = [channel / 255.0 for channel in of_part(name)]
-                dashes = next((d for end, d in _SHADES.items() if name.endswith(end)), "-")
-                label = name.replace("_", " ")
-                plot.plot(time_s, degrees[:, column], dashes, color=colour, lw=1.1, label=label)
-            plot.set(title=title, ylabel="angle [deg]")
+            colours = _colours([angles[column].name for column in columns])
+            for column, colour in zip(columns, colours, strict=True):
+                label = angles[column].name.replace("_", " ")
+                plot.plot(time_s, degrees[:, column], color=colour, lw=1.1, label=label)
+            plot.set_title(title, loc="left", fontsize=10)
+            plot.set_ylabel("angle [deg]")
             plot.grid(alpha=0.3)
             plot.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False)
         plots[-1].set_xlabel("time [s]")
@@ -62,6 +67,7 @@ def write(part: Part, file: BinaryIO) -> None:
             f"{about['take']} · {about['subject']} · {about['hand_side']} hand · "
             f"{about['start_utc']} · zero: {about['zero']}",
             fontsize=9,
+            y=1.0 - 0.3 * edge,
         )
         told = {
             "Title": str(about["take"]),
@@ -79,6 +85,13 @@ def _groups(angles: tuple[Angle, ...]) -> dict[str, list[int]]:
     for index, angle in enumerate(angles):
         groups.setdefault(_title(angle), []).append(index)
     return groups
+
+
+def _colours(names: list[str]) -> list[list[float]]:
+    """Each finger's own, where there is one curve a finger."""
+    apart = len({name.split("_")[0] for name in names}) == len(names)
+    chosen = [of_part(n) if apart else _CYCLE[k % len(_CYCLE)] for k, n in enumerate(names)]
+    return [[channel / 255.0 for channel in colour] for colour in chosen]
 
 
 def _title(angle: Angle) -> str:

@@ -17,12 +17,21 @@ from handstudio import __version__
 from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors, Source
 from handstudio.calibration.subject import Centre, SubjectCalibration
 from handstudio.errors import TakeError
-from handstudio.export import csv as csv_module
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export import part as part_module
+from handstudio.export import tables as tables_module
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Content, Processed, Window
 from handstudio.hand.angles import ROOT_ANGLES
-from handstudio.hand.skeleton import FINGERS, JOINTS
+from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS
 from handstudio.health.record import Episode
-from handstudio.kinematics import angles_of, measured_angles, pose_of, relative_rotations
+from handstudio.kinematics import (
+    angles_of,
+    measured_angles,
+    pose_of,
+    relative_rotations,
+    segment_attitudes,
+)
 from handstudio.layout import JointPlace, Layout, SensorPlace
 from handstudio.pipeline import Motion, unsure
 from handstudio.process import process
@@ -32,7 +41,7 @@ from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
 from handstudio.setup import HandModel, Setup, calibrated
 
-CONTENTS: tuple[Content, ...] = ("angles", "orientations", "positions")
+CONTENTS: tuple[Content, ...] = ("angles", "orientations", "segments", "positions")
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +84,19 @@ def read(path: Path) -> tuple[list[str], np.ndarray]:
     with path.open(newline="", encoding="utf-8") as file:
         names, *rows = list(csv.reader(file))
     return names, np.array([[float(cell) for cell in row] for row in rows])
+
+
+def export_csv(
+    take: Take,
+    setup: Setup,
+    motion: Motion,
+    target: Path,
+    *,
+    content: Content = "angles",
+    window: Window | None = None,
+) -> Path:
+    source = Processed(take, setup, motion)
+    return export(source, target, FORMATS["csv"], content=content, window=window)
 
 
 def exported(
@@ -122,6 +144,13 @@ def test_orientations_are_those_of_the_sensors_and_across_the_joints(recorded, m
     np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-7)
 
 
+def test_segments_are_those_of_the_hand_in_the_world(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, "segments")
+    assert names == ["time_s", *(f"{s}_q{p}" for s in SEGMENTS for p in "wxyz"), "doubtful_sensors"]
+    expected = segment_attitudes(recorded.header.setup, motion.q_world_sensor)
+    np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-7)
+
+
 def test_positions_are_those_of_joints_and_fingertips_in_millimetres(recorded, motion, tmp_path):
     names, values = exported(recorded, motion, tmp_path, "positions")
     points = [*(joint.name for joint in JOINTS), *(f"{finger}_tip" for finger in FINGERS)]
@@ -152,7 +181,7 @@ def test_how_many_rows_are_written_at_a_time_changes_no_byte(
 ):
     exported(recorded, motion, tmp_path, content)
     whole = (tmp_path / "out.csv").read_bytes()
-    monkeypatch.setattr(csv_module, "_BLOCK", 97)
+    monkeypatch.setattr(part_module, "BLOCK", 97)
     exported(recorded, motion, tmp_path, content)
     assert (tmp_path / "out.csv").read_bytes() == whole
     assert b"-0," not in whole
@@ -224,7 +253,7 @@ def test_a_take_without_a_hand_gives_orientations(door, tmp_path):
     np.testing.assert_allclose(values[:, 9:13], across, atol=0.50001e-7)
 
 
-@pytest.mark.parametrize("content", ["angles", "positions"])
+@pytest.mark.parametrize("content", ["angles", "positions", "segments"])
 def test_a_take_without_a_hand_has_no_angles_and_leaves_no_file(door, tmp_path, content):
     with pytest.raises(TakeError, match=r"no joint angles.*which hand.*\n.*orientations instead"):
         exported(*door, tmp_path, content)
@@ -377,7 +406,7 @@ def test_a_file_that_cannot_be_written_is_named_and_the_one_before_stays(
 ):
     exported(recorded, motion, tmp_path)
     before = (tmp_path / "out.csv").read_bytes()
-    monkeypatch.setattr(csv_module, "metadata", _full)
+    monkeypatch.setattr(tables_module.Table, "rounded", _full)
     with pytest.raises(TakeError, match=r"out\.csv: cannot be written.*\n.*another folder"):
         exported(recorded, motion, tmp_path, "positions")
     assert (tmp_path / "out.csv").read_bytes() == before
@@ -387,5 +416,5 @@ def test_a_file_that_cannot_be_written_is_named_and_the_one_before_stays(
         export_csv(recorded, recorded.header.setup, motion, tmp_path / "file" / "out.csv")
 
 
-def _full(*_: object) -> bytes:
+def _full(*_: object) -> np.ndarray:
     raise OSError(28, "No space left on device")

@@ -19,7 +19,9 @@ from app.studio import Studio
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
 from handstudio.device.recorder import Recorder
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Content, Processed, Window
 from handstudio.pipeline import Motion
 from handstudio.process import process
 from handstudio.recording.header import Header
@@ -79,12 +81,18 @@ class PromptJobs:
         return done(lambda: process(open_take(path), setup))
 
     def export(
-        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+        self,
+        path: Path,
+        name: str,
+        content: Content | None,
+        window: Window,
+        setup: Setup | None = None,
     ) -> Future[Path]:
-        take = open_take(path)
+        take, chosen = open_take(path), FORMATS[name]
         setup = setup or take.header.setup
-        motion = process(take, setup)
-        return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
+        source = Processed(take, setup, process(take, setup))
+        target = chosen.target(path, chosen.content(content, setup.layout))
+        return done(lambda: export(source, target, chosen, content=content, window=window))
 
 
 def done(work: Callable[[], Any]) -> Future[Any]:
