@@ -110,7 +110,9 @@ FORMATS: dict[str, Format] = {
             fills_gaps=True,
         ),
         Format("glb", ("skeleton",), glb.write, axes=f"{_Y_UP}; metres", fills_gaps=True),
-        Format("mcap", ("motion",), mcap.write, axes=f"{_OURS}; metres", ending=VIEW),
+        Format(
+            "mcap", ("motion",), mcap.write, axes=f"{_OURS}; metres", ending=VIEW, more=mcap.places
+        ),
         Format("svg", ("angles",), svg.write),
     )
 }

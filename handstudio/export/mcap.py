@@ -34,6 +34,13 @@ _ASIDE_M = 0.1
 _THICK_M, _BALL_M = 0.006, 0.012
 
 
+def places(part: Part) -> dict[str, Any]:
+    """What the file tells of where things are."""
+    if part.setup.layout.is_hand:
+        return {}
+    return {"places": "sensors side by side, 0.1 m apart: where they are is not known"}
+
+
 def write(part: Part, file: BinaryIO) -> None:
     """Write every instant."""
     writer = Writer(file, compression=CompressionType.ZSTD)

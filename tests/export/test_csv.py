@@ -32,51 +32,13 @@ from handstudio.kinematics import (
     relative_rotations,
     segment_attitudes,
 )
-from handstudio.layout import JointPlace, Layout, SensorPlace
-from handstudio.pipeline import Motion, unsure
-from handstudio.process import process
-from handstudio.recording.header import Header, Summary
-from handstudio.recording.simulated import rehearse, simulate
+from handstudio.pipeline import Motion
+from handstudio.recording.header import Summary
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
-from handstudio.setup import HandModel, Setup, calibrated
+from handstudio.setup import Setup, calibrated
 
 CONTENTS: tuple[Content, ...] = ("angles", "orientations", "segments", "positions")
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Take:
-    """Six seconds of a left virtual glove: rest, then the forearm raised and a fist begun."""
-    folder = tmp_path_factory.mktemp("recorded")
-    hand = HandModel(hand_length_m=0.175)
-    return open_take(
-        simulate(
-            folder,
-            rehearse(seed=1, side="left", hand_length_m=hand.hand_length_m),
-            seconds=6.0,
-            health=True,
-        )
-    )
-
-
-@pytest.fixture(scope="module")
-def motion(recorded) -> Motion:
-    return process(recorded)
-
-
-@pytest.fixture
-def door(tmp_path) -> tuple[Take, Motion]:
-    """A take without a hand: two sensors of a door, one joint; the motion is made up."""
-    places = (SensorPlace("leaf, inner", "door"), SensorPlace("frame", "wall"))
-    layout = Layout("unknown", places, (JointPlace("hinge", "wall", "door", 1),))
-    header = Header("door", "S01", 10**18, Setup(layout, 50.0), "samples", "by hand")
-    take = open_take(TakeWriter(tmp_path / "door.mcap", header).close())
-    rng = np.random.default_rng(2)
-    q = rng.normal(size=(5, 2, 4))
-    q /= np.linalg.norm(q, axis=-1, keepdims=True)
-    doubt = np.array([[0, 0], [1, 0], [3, 8], [0, 4], [0, 0]], dtype=np.uint8)
-    time_us = np.array([5_000_000, 5_020_000, 5_040_001, 5_100_000, 5_120_000])
-    return take, Motion(time_us, q, np.full((5, 4), np.nan), doubt, unsure(doubt))
 
 
 def read(path: Path) -> tuple[list[str], np.ndarray]:
