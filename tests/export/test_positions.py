@@ -118,7 +118,7 @@ def test_c3d_counts_beyond_sixteen_bits(into, whole):
         warnings.filterwarnings("ignore", "No analog data")
         file = c3d.Reader(stream)  # ezc3d finds as many, and takes ten seconds for it
         assert (file.first_frame, file.last_frame) == (1, 70_100)
-        data = (file.get("POINT:DATA_START").int16_value - 1) * 512
+        data = (int(file.get("POINT:DATA_START").int16_value) - 1) * 512
     frames = np.fromfile(path, "<f4", 70_100 * 23 * 4, offset=data).reshape(-1, 23, 4)
     there = [*range(50), *range(70_050, 70_100)]
     assert np.flatnonzero(frames[:, 0, 3] == 0.0).tolist() == there
