@@ -86,7 +86,7 @@ class Calibrator:
             HandstudioError: it cannot be begun, and why.
         """
         courses = self.courses(state)
-        if courses is None or not state.newest.ready:
+        if courses is None or not state.can_record:
             raise HandstudioError(
                 "There is no device to calibrate with.", "Connect one under Device, then begin."
             )

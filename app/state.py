@@ -12,7 +12,7 @@ from app.look import View
 from app.review import Review
 from app.shaken import Shaking
 from app.sounds import Sound
-from app.taking import Countdown, Disk
+from app.taking import BLIP_S, Countdown, Disk
 from handstudio.device import find
 from handstudio.device.find import Found
 from handstudio.device.orders import Newest
@@ -81,6 +81,7 @@ class State:
         stands: Where the courses of the subject and the device stand.
         in_use: The calibrations that are in use.
         preparing: Whether the whole-hand filter is still awaited.
+        away_s: How long no take could begin, as the device sends nothing or nobody is known [s].
         guided: The course that is on.
         result: What came of the last course, until somebody has seen it.
         asking: The page that must say whose hand it is before a take can begin.
@@ -96,6 +97,7 @@ class State:
     devices: tuple[Found, ...] = (find.VIRTUAL,)
     searching: bool = False
     shelf: Shelf = Shelf()
+    away_s: float = 0.0
     countdown: Countdown | None = None
     disk: Disk | None = None
     marks: int = 0  # put into the take that is on
@@ -123,6 +125,11 @@ class State:
         """The person whose takes are recorded; None: nobody was chosen."""
         code = self.settings.subject
         return next((known for known in self.shelf.subjects if known.code == code), None)
+
+    @property
+    def can_record(self) -> bool:
+        """Whether a take can begin; a device that has only just gone still is waited for."""
+        return self.newest.ready or (self.newest.setup is not None and self.away_s < BLIP_S)
 
     @property
     def hand_length_mm(self) -> float:

@@ -395,7 +395,7 @@ class Studio:
         return twice
 
     def _begin_course(self, order: intents.BeginCourse) -> None:
-        if self.state.newest.ready and self.state.subject is None:
+        if self.state.can_record and self.state.subject is None:
             self.state = replace(self.state, asking=order.page, asking_for=order.name)
             return
         if self._calibrator.guided is not None:
@@ -448,7 +448,7 @@ class Studio:
         if self._taker.countdown is not None:
             self._taker.cancel()
             return
-        if not self.state.newest.ready:
+        if not self.state.can_record:
             raise HandstudioError(
                 "There is no device to record from.", "Connect one under Device, then record."
             )
@@ -462,6 +462,8 @@ class Studio:
 
     def _take_on(self, elapsed_s: float) -> None:
         """The countdown, the disk, and the end that comes by itself."""
+        away_s = 0.0 if self.state.newest.ready else self.state.away_s + elapsed_s
+        self.state = replace(self.state, away_s=away_s)
         try:
             for sound in self._taker.tick(elapsed_s, self.state, self.store.settings):
                 self._sound(sound)

@@ -70,7 +70,7 @@ class Taker:
             HandstudioError: a take was not begun, or was ended, and why.
         """
         self._look_at_disk(elapsed_s, state)
-        sounds = self._count(elapsed_s, state.newest, settings)
+        sounds = self._count(elapsed_s, state, settings)
         recording = state.newest.recorder is not None
         if not recording:
             self._watch = Watch()
@@ -100,11 +100,11 @@ class Taker:
         self.marks = len(notes.marks)
         return True
 
-    def _count(self, elapsed_s: float, newest: Newest, settings: Settings) -> list[Sound]:
+    def _count(self, elapsed_s: float, state: State, settings: Settings) -> list[Sound]:
         before = self.countdown
         if before is None:
             return []
-        if not newest.ready:
+        if not state.can_record:
             self.countdown = None
             raise HandstudioError(
                 "The device went away before the take began.", "Connect it, then record again."
@@ -114,6 +114,8 @@ class Taker:
             self.countdown = now
             begun = before.left_s == settings.countdown_s
             return [Sound.TICK] if begun or now.shown != before.shown else []
+        if not state.newest.ready:  # it begins as soon as the device sends again
+            return []
         self.countdown = None
         self._start(settings, settings.take_name)
         return [Sound.START]

@@ -12,6 +12,10 @@ ALONE_LIMIT_S = 60.0
 LOST_LIMIT_S = 600.0
 """A take ends when its device has been away this long: a glove that was put away."""
 
+BLIP_S = 2.0
+"""A device that has been still for less is as good as there: on a busy machine nothing may come for
+half a second, and nobody's press of *Record* is to be refused for that."""
+
 WARN_SECONDS = 15 * 60
 """Say so when the disk has room for less than this: longer than most takes."""
 

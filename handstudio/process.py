@@ -188,7 +188,7 @@ def _compute(take: Take, setup: Setup, from_start: bool, folder: Path, progress:
 def _fill(
     writer: MotionWriter, take: Take, setup: Setup, from_start: bool, progress: Progress
 ) -> None:
-    state = _first_state(take, setup, from_start)
+    state = first_state(take, setup, from_start)
     whole = max(1, take.summary.bytes if take.summary else take.path.stat().st_size)
     seen = 0
     smoother = Smoother(setup) if setup.smooth else None
@@ -211,7 +211,12 @@ def _size(event: Event, kind: Literal["wire", "samples"]) -> int:
     return len(event) * per_sensor * event.gyr.shape[1] if isinstance(event, ImuSamples) else 0
 
 
-def _first_state(take: Take, setup: Setup, from_start: bool) -> pipeline.State:
+def first_state(take: Take, setup: Setup, from_start: bool = False) -> pipeline.State:
+    """What the pipeline knew at the first byte of a take.
+
+    Raises:
+        SetupError: the stored state does not fit this version.
+    """
     if from_start or not take.first_state.pipeline:
         return pipeline.begin(setup)
     return pipeline.unpack(setup, take.first_state.pipeline)

@@ -16,18 +16,20 @@ jaxtyping.install_import_hook("handstudio", "beartype.beartype")
 
 DATA_VARIABLE = "HANDSTUDIO_DATA"
 
-# The same examples everywhere and every time: a failure in CI is a failure at the desk.
-hypothesis.settings.register_profile(
-    "ci",
-    derandomize=True,
-    deadline=None,  # a busy machine is no bug
-    max_examples=25 if os.environ.get("CI") == "true" else 100,
-)
-hypothesis.settings.load_profile("ci")
-
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="also run the tests that take minutes")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # The same examples everywhere and every time: a failure in CI is a failure at the desk.
+    hypothesis.settings.register_profile(
+        "everywhere",
+        derandomize=True,
+        deadline=None,  # a busy machine is no bug
+        max_examples=100 if config.getoption("--long") else 25,
+    )
+    hypothesis.settings.load_profile("everywhere")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

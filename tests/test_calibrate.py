@@ -71,12 +71,14 @@ def test_it_is_text_that_reads_back(done: Calibrated) -> None:
     assert decode(encode(done.calibration), "it") == done.calibration
 
 
+@pytest.mark.long
 def test_the_same_takes_give_the_same_calibration(take: Take, done: Calibrated) -> None:
     again = calibrate([take]).calibration
     assert again.segments == done.calibration.segments
     assert again.takes == done.calibration.takes
 
 
+@pytest.mark.long
 def test_what_is_done_sloppily_is_told_with_its_reason(folder: Path) -> None:
     course = COURSE.replace("index_pip:flexion", "index_pip:flexion~small")
     told = calibrate([open_take(simulate(folder, rehearse(7, course, parse("plain"), 8)))])

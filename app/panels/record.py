@@ -9,7 +9,6 @@ from app.panels.base import QUIET, Send, page_of, put, typed
 from app.state import HAND_LENGTH_MM, State
 from app.views import recording as recording_view
 from app.words import _
-from handstudio.device.orders import Phase
 from handstudio.recording.subjects import Subject
 
 RED = (200, 52, 52)
@@ -28,7 +27,7 @@ class RecordButton:
         """Show whether a take is on."""
         newest = state.newest
         recording, counting = newest.recorder is not None, state.countdown is not None
-        ready = recording or counting or newest.phase is Phase.STREAMING
+        ready = recording or counting or state.can_record
         label = _("Stop") if recording else _("Call it off") if counting else _("Record")
         icon = viser.Icon.PLAYER_STOP if recording else viser.Icon.PLAYER_RECORD
         if self._button.label != label:

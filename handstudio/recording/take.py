@@ -96,7 +96,7 @@ class Take:
             for _, data in self.chunks():
                 yield [decode_samples(data)]
             return
-        stream = self._stream(from_start)
+        stream = self.stream(from_start)
         for arrival_ns, chunk in self.chunks():
             yield stream.feed(chunk, arrival_ns)[1]
 
@@ -110,7 +110,7 @@ class Take:
             for _, data in self.chunks():
                 yield None, [], [decode_samples(data)]
             return
-        stream = self._stream(from_start=False)
+        stream = self.stream(from_start=False)
         for arrival_ns, chunk in self.chunks():
             yield arrival_ns, *stream.feed(chunk, arrival_ns)
 
@@ -119,7 +119,12 @@ class Take:
         with self.path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
-    def _stream(self, from_start: bool) -> EventStream:
+    def stream(self, from_start: bool = False) -> EventStream:
+        """What makes packets and events of its chunks, as it was at the first byte.
+
+        Raises:
+            TakeError: nobody knows which decoder the bytes need.
+        """
         setup = self.header.setup
         if setup.decoder is None:
             raise TakeError(

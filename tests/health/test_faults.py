@@ -45,8 +45,11 @@ def test_every_kind_has_a_limit_and_a_unit():
 # --- a sensor -------------------------------------------------------------------------------------
 
 
+FAST = pytest.param(1000, marks=pytest.mark.long)
+
+
 @pytest.mark.parametrize("motion", ["rest", "showcase"])
-@pytest.mark.parametrize("rate_hz", [100, 1000])
+@pytest.mark.parametrize("rate_hz", [100, FAST])
 def test_a_stuck_sensor(rate_hz, motion):
     one = glove(rate_hz, 6.0, motion=motion)
     at = 2 * rate_hz
@@ -69,9 +72,9 @@ def test_half_of_the_sensors_may_be_stuck():
     spoilt(watched(one, one.chunks()), Kind.STUCK, sensors=tuple(range(12)))
 
 
-@pytest.mark.parametrize("rate_hz", [100, 1000])
+@pytest.mark.parametrize("rate_hz", [100, FAST])
 @pytest.mark.parametrize("part", [slice(0, 3), slice(3, 6), slice(4, 5)])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_noisy_sensor(part, rate_hz, seed):
     one = glove(rate_hz, 6.0, seed)
     usual = np.diff(one.counts[:, 0, part].astype(float), axis=0).std() / np.sqrt(2.0)
@@ -264,6 +267,7 @@ def test_a_clock_that_drifts():
     assert found.value == pytest.approx(2000.0, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_host_that_stood_still_is_not_a_clock_that_drifts():
     one = glove(50, 40.0)
     chunks = [

@@ -18,8 +18,9 @@ from handstudio.simulation.trajectory import Trajectory
 from handstudio.simulation.world import World
 
 NAMES = [kind.name for kind in GRASPS]
-EVERYDAY = [("power_sphere", 2, "right"), ("tripod", 5, "left"), ("medium_wrap", 3, "right")]
-EVERYDAY += [("lateral_pinch", 1, "right"), ("thumb_4_finger", 0, "left")]
+SOME = [("tripod", 5, "left"), ("lateral_pinch", 1, "right")]
+MORE = [("power_sphere", 2, "right"), ("medium_wrap", 3, "right"), ("thumb_4_finger", 0, "left")]
+SOME += [pytest.param(*one, marks=pytest.mark.long) for one in MORE]
 
 
 def object_of(trajectory: Trajectory) -> tuple[HeldObject, float, float]:
@@ -68,11 +69,12 @@ def check(name: str, number: int, side: str, argument: str | None = None, seed: 
     assert (posture <= most + 1e-9).all()
 
 
-@pytest.mark.parametrize(("name", "number", "side"), EVERYDAY)
+@pytest.mark.parametrize(("name", "number", "side"), SOME)
 def test_skin_lies_on_what_is_held(name, number, side):
     check(name, number, side)
 
 
+@pytest.mark.long
 def test_a_size_can_be_asked_for():
     check("power_sphere", 4, "right", "power_sphere/60")
     held, *_ = object_of(perform("grasp:power_sphere/60", Actor(subject(4))))

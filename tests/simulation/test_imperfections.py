@@ -288,7 +288,7 @@ def test_clocks_and_ages_have_their_sizes():
     assert 0.0 <= ages.min() < 0.01 * AGE_S
     assert 0.99 * AGE_S < ages.max() <= AGE_S
     assert ages.mean() == pytest.approx(0.5 * AGE_S, rel=0.1)
-    stamps = np.arange(0, 100_000_000, 10_000)
+    stamps = np.arange(0, 30_000_000, 10_000)
     for worn in some[:3]:
         one, _ = sense(worn, begin(worn), STILL, stamps, 100)
         off_s = one.time_s - stamps * 1e-6 / (1.0 + worn.timing.drift)
@@ -301,7 +301,7 @@ def test_jitter_never_puts_instants_out_of_order():
     assert np.diff(one.time_s).min() > 0.0005
 
 
-@pytest.mark.parametrize("rate_hz", [100, 1000])
+@pytest.mark.parametrize("rate_hz", [100, pytest.param(1000, marks=pytest.mark.long)])
 def test_a_sensor_reads_what_was_felt_when_it_was_read(rate_hz):
     """The line between two instants against the instant itself, to the size that is stated."""
     worn = wear(subject(3), glove(), parse("skew"), 5)

@@ -214,6 +214,7 @@ def test_the_skin_of_the_forearm_lags_behind_its_rotation(side):
     assert (np.abs(tilts)[:, 3:] < 1e-12).all()
 
 
+@pytest.mark.long
 def test_boards_pitch_as_joints_bend():
     postures = {f"{finger}_pip_flexion": 45.0 for finger in ("index", "middle", "ring", "little")}
     tilts = np.array([displaced("rock", postures, seed=seed)[0] for seed in range(40)])
@@ -225,6 +226,7 @@ def test_boards_pitch_as_joints_bend():
     assert np.abs(tilts[..., 1:]).max() < 1e-12
 
 
+@pytest.mark.long
 def test_a_pip_angle_errs_as_skin_markers_do_against_tomography():
     """Half and full fists, as Metcalf et al. took them: an RMS error below 4 degrees."""
     names, errors = glove().names, []

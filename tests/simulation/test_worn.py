@@ -79,7 +79,13 @@ def test_somebody_at_rest_reads_gravity_and_the_field(side):
     np.testing.assert_allclose(so3.rotate(q, samples.mag), field, atol=1e-12)
 
 
-@pytest.mark.parametrize(("side", "what"), [("right", "ideal"), ("left", "soft_tissue,mounting")])
+@pytest.mark.parametrize(
+    ("side", "what"),
+    [
+        ("right", "ideal"),
+        pytest.param("left", "soft_tissue,mounting", marks=pytest.mark.long),
+    ],
+)
 def test_a_minute_of_work_integrates_to_the_true_orientation(what, side):
     """Rates at 1000 Hz, taken to run straight from instant to instant."""
     worn = wear(subject(3, side), glove(side), parse(what), 5)

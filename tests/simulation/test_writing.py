@@ -77,6 +77,7 @@ def four():
     return written("同志社大")
 
 
+@pytest.mark.long
 def test_four_characters_are_legible(four):
     """Every point of the trace lies on a stroke that was asked for, and none was left out."""
     truth, cloud = four[3], asked("同志社大")

@@ -53,7 +53,12 @@ def test_a_smoothed_take_stays_where_it_was(studio: Studio, kept: Take) -> None:
     np.testing.assert_array_equal(again.motion.q_world_sensor, process(kept).q_world_sensor)
 
 
-@pytest.mark.parametrize("name", [*FILTERS, SMOOTHED])
+SLOW = ("filter2", "filter3")  # as the thesis has them, a sample at a time
+NAMES = [name for name in (*FILTERS, SMOOTHED) if name not in SLOW]
+NAMES += [pytest.param(name, marks=pytest.mark.long) for name in SLOW]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_a_second_hand_is_shown_with_its_curves_and_by_how_much_they_differ(
     studio: Studio, kept: Take, name: str
 ) -> None:

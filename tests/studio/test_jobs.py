@@ -28,7 +28,7 @@ def test_work_is_done_and_kept(jobs: Jobs, tmp_path: Path) -> None:
 
 
 def test_work_that_is_stopped_leaves_nothing_half_done(jobs: Jobs, tmp_path: Path) -> None:
-    path = simulate(tmp_path, seconds=120.0)
+    path = simulate(tmp_path, seconds=30.0)
     work = jobs.process(path)
     jobs.cancel()
     with pytest.raises(Stopped):

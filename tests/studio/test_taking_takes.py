@@ -12,6 +12,7 @@ import pytest
 from app import intents, taking
 from app.sounds import Sound
 from app.studio import Studio
+from app.taking import BLIP_S
 from app.views import recording as recording_view
 from handstudio.device.orders import Phase, StartTake, StopTake
 from handstudio.recording.notes import load_notes
@@ -111,10 +112,24 @@ def test_a_device_that_goes_while_it_is_counted_begins_no_take(
 ) -> None:
     after(streaming, intents.SetCountdown(3), intents.ToggleRecording())
     capture.newest = replace(capture.newest, phase=Phase.LOST)
-    state = streaming.tick(TICK_S)
+    assert streaming.tick(TICK_S).countdown is not None  # it may only be late
+    state = streaming.tick(BLIP_S)
     assert state.countdown is None
     assert state.messages[0].alarm
     assert capture.orders == []
+
+
+def test_a_device_that_is_late_is_waited_for(streaming: Studio, capture: StillCapture) -> None:
+    capture.newest = replace(capture.newest, phase=Phase.LOST)
+    streaming.tick(TICK_S)
+    state = after(streaming, intents.SetCountdown(0), intents.ToggleRecording())
+    assert state.countdown is not None
+    assert state.messages == ()
+    assert streaming.tick(0.5).countdown is not None
+    assert capture.orders == []
+    capture.newest = replace(capture.newest, phase=Phase.STREAMING)
+    assert streaming.tick(TICK_S).countdown is None
+    assert isinstance(capture.orders[-1], StartTake)
 
 
 def test_space_ends_the_take_that_is_on(
