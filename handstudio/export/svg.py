@@ -10,7 +10,6 @@ import numpy as np
 from handstudio.arrays import Array
 from handstudio.colours import INDEX, LITTLE, MIDDLE, RING, THUMB, of_part
 from handstudio.errors import TakeError
-from handstudio.export.metadata import CONVENTION
 from handstudio.export.part import Part
 from handstudio.hand.angles import Angle
 from handstudio.kinematics import angles_of
@@ -74,7 +73,6 @@ def write(part: Part, file: BinaryIO) -> None:
             "Creator": str(about["software"]),
             "Date": str(about["start_utc"]),
             "Description": msgspec.json.encode(about).decode(),
-            "Coverage": CONVENTION,
         }
         figure.savefig(file, format="svg", metadata=told)
 
