@@ -21,6 +21,7 @@ from app.state import State
 from app.studio import Studio
 from handstudio import __version__
 from handstudio.device.capture import Capture
+from handstudio.device.orders import HeadingTaken, TakeDone
 from handstudio.log import log_folder, logging_to
 from handstudio.scrub import Scrubber
 from handstudio.settings import SettingsStore
@@ -105,7 +106,8 @@ def _serve(options: Options, scrubber: Scrubber) -> int:
             preparation.close()
         store.flush()
         for report in capture.reports():
-            out.print(str(getattr(report, "path", report)))
+            if not isinstance(report, HeadingTaken):
+                out.print(str(report.path if isinstance(report, TakeDone) else report))
     return 0
 
 

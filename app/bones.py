@@ -11,7 +11,7 @@ from jaxtyping import Float
 from app import colours
 from handstudio.arrays import Array
 from handstudio.hand.pose import Pose
-from handstudio.hand.skeleton import DISTALS, FINGERS, PARENTS, SEGMENTS, Skeleton
+from handstudio.hand.skeleton import DISTALS, FINGERS, PARENTS, SEGMENTS, ULNAR, Skeleton
 from handstudio.maths import so3
 
 # half widths of the ends as a share of hand length (drawn, not measured)
@@ -85,7 +85,8 @@ def _palm(skeleton: Skeleton) -> list[_Bone]:
         mcp = SEGMENTS.index(f"{finger}_proximal")
         block = SEGMENTS[PARENTS[mcp]]
         end = skeleton.t_parent_joint[mcp]
-        start = end * [0.42, 0.12, 0.3] if block == "hand" else end * [0.2, 0.02, 0.0]
+        hinged = skeleton.t_parent_joint[SEGMENTS.index(block)].any() and block == ULNAR
+        start = end * ([0.2, 0.02, 0.0] if hinged else [0.42, 0.12, 0.3])
         bones.append(_Bone("metacarpal", block, start, end, _PHALANX[finger] * hand))
     return bones
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 
 from app import colours
 from app.words import _, language
@@ -19,7 +19,16 @@ from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
 from handstudio.setup import Setup
+from handstudio.signals import Signals
 
+OVERVIEW, SPEEDS, SIGNALS = "overview", "speeds", "signals"
+"""What can be plotted, besides all angles of one part of the hand."""
+
+OF_TAKES = (SPEEDS, SIGNALS)
+"""What is there of takes alone."""
+
+_FINGERS = ("index", "middle", "ring", "little")
+_PARTS = ("thumb", *_FINGERS, "wrist")
 _MOST_SENSORS = 4  # without a hand: more curves than this say nothing
 
 
@@ -33,40 +42,71 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """Curves that share a pair of axes, degrees over seconds."""
+    """Curves that share a pair of axes, in this unit over seconds."""
 
     title: str
     curves: tuple[Curve, ...]
+    unit: str = "°"
 
 
-def plots_of(layout: Layout) -> tuple[Plot, ...]:
-    """The plots of a layout, top to bottom."""
+def sets_of(layout: Layout) -> dict[str, str]:
+    """What can be plotted of a layout, by name, in words."""
+    sets = {OVERVIEW: _("Overview")}
     if layout.is_hand:
-        return tuple(plot for plot, _names in _hand_plots(layout, language()))
-    return _sensor_plots(layout)
+        sets |= {name: _part_words(name) for name in _PARTS if _group(layout, name)}
+        sets[SPEEDS] = _("Speeds of the overview")
+    return {**sets, SIGNALS: _("Signals of a sensor")}
 
 
-def values_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
-    """Values of all curves in the order of the plots [deg]."""
+def plots_of(layout: Layout, chosen: str = OVERVIEW, sensor: str = "") -> tuple[Plot, ...]:
+    """The plots of a layout, top to bottom; of signals, those of one sensor."""
+    if chosen == SIGNALS:
+        return _signal_plots(sensor)
+    if not layout.is_hand:
+        return _sensor_plots(layout)
+    plots = tuple(plot for plot, _names in _hand_plots(layout, chosen, language()))
+    if chosen == SPEEDS:
+        return tuple(replace(plot, unit="°/s") for plot in plots)
+    return plots
+
+
+def values_of(setup: Setup, motion: Motion, chosen: str = OVERVIEW) -> Float[Array, "n c"]:
+    """Values of all curves of angles in the order of the plots [deg]."""
     if setup.layout.is_hand:
         by_name = {angle.name: angle for angle in measured_angles(setup.layout)}
-        wanted = [
-            by_name[name]
-            for _plot, names in _hand_plots(setup.layout, language())
-            for name in names
-        ]
+        wanted = [by_name[name] for name in _names(setup.layout, chosen)]
         degrees: Array = np.rad2deg(angles_of(setup, motion, wanted))
         return degrees
     return _sensor_values(setup.layout, motion)
 
 
-def sds_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
+def speeds_of(setup: Setup, motion: Motion, at: Int64[Array, " n"]) -> Float[Array, "n c"]:
+    """Speeds of the overview's angles at some instants [deg/s], over the two beside each."""
+    before, after = np.maximum(at - 1, 0), np.minimum(at + 1, len(motion) - 1)
+    turned = values_of(setup, picked(motion, after)) - values_of(setup, picked(motion, before))
+    seconds = (motion.time_us[after] - motion.time_us[before]) * 1e-6
+    turned = (turned + 180.0) % 360.0 - 180.0
+    return np.asarray(turned / np.where(seconds > 0.0, seconds, np.inf)[:, None])
+
+
+def signals_of(signals: Signals, at: Int64[Array, " n"], sensor: int) -> Float[Array, "n 9"]:
+    """What one sensor told at some instants: turn rates [deg/s], forces [m/s2], field [uT]."""
+    kinds = np.rad2deg(signals.gyr[at, sensor]), signals.acc[at, sensor], signals.mag[at, sensor]
+    return np.concatenate(kinds, axis=1, dtype=np.float64)
+
+
+def picked(motion: Motion, index: Int64[Array, " m"]) -> Motion:
+    """Some instants of a motion."""
+    return Motion(*(getattr(motion, name)[index] for name in Motion.__slots__))
+
+
+def sds_of(setup: Setup, motion: Motion, chosen: str = OVERVIEW) -> Float[Array, "n c"]:
     """How sure the filter is of each curve: standard deviations [deg]; inf where it does not tell.
 
     Of an angle it is that of the joint's child relative to the sensor before the joint.
     """
     layout = setup.layout
-    columns = _hand_sources(layout) if layout.is_hand else _sensor_sources(layout)
+    columns = _hand_sources(layout, chosen) if layout.is_hand else _sensor_sources(layout)
     degrees: Array = np.rad2deg(
         motion.sd_rad[:, [s for s, _of in columns], [k for _, k in columns]]
     )
@@ -76,10 +116,9 @@ def sds_of(setup: Setup, motion: Motion) -> Float[Array, "n c"]:
 _OWN, _RELATIVE = 0, 1  # of `Motion.sd_rad`
 
 
-def _hand_sources(layout: Layout) -> list[tuple[int, int]]:
+def _hand_sources(layout: Layout, chosen: str) -> list[tuple[int, int]]:
     joints = {angle.name: angle.joint for angle in measured_angles(layout)}
-    names = [name for _plot, names in _hand_plots(layout, language()) for name in names]
-    children = [SEGMENTS[joint_index(joints[name])] for name in names]
+    children = [SEGMENTS[joint_index(joints[name])] for name in _names(layout, chosen)]
     return [(layout.drivers[child], _RELATIVE) for child in children]
 
 
@@ -90,22 +129,30 @@ def _sensor_sources(layout: Layout) -> list[tuple[int, int]]:
     return own + [(layout.drivers[joint.child], _RELATIVE) for joint in joints]
 
 
+def _names(layout: Layout, chosen: str) -> list[str]:
+    """Names of the angles in the plots, in their order."""
+    return [name for _plot, names in _hand_plots(layout, chosen, language()) for name in names]
+
+
 @cache
-def _hand_plots(layout: Layout, _language: str) -> tuple[tuple[Plot, tuple[str, ...]], ...]:
+def _hand_plots(
+    layout: Layout, chosen: str, _language: str
+) -> tuple[tuple[Plot, tuple[str, ...]], ...]:
+    if chosen in _PARTS:
+        return tuple(_one_each(layout, chosen))
     measured = {angle.name for angle in measured_angles(layout)}
-    fingers = ("index", "middle", "ring", "little")
     groups: list[tuple[str, list[str], Callable[[str], str]]] = [
         (
             _("MCP flexion"),
-            ["thumb_mcp_flexion", *(f"{f}_mcp_flexion" for f in fingers)],
+            ["thumb_mcp_flexion", *(f"{f}_mcp_flexion" for f in _FINGERS)],
             _finger,
         ),
         (
             _("PIP flexion, thumb IP"),
-            ["thumb_ip_flexion", *(f"{f}_pip_flexion" for f in fingers)],
+            ["thumb_ip_flexion", *(f"{f}_pip_flexion" for f in _FINGERS)],
             _finger,
         ),
-        (_("DIP flexion"), [f"{f}_dip_flexion" for f in fingers], _finger),
+        (_("DIP flexion"), [f"{f}_dip_flexion" for f in _FINGERS], _finger),
         (
             _("Wrist and thumb base"),
             ["wrist_flexion", "wrist_deviation_ulnar", "thumb_cmc_abduction", "thumb_cmc_flexion"],
@@ -120,6 +167,52 @@ def _hand_plots(layout: Layout, _language: str) -> tuple[tuple[Plot, tuple[str, 
         if present:
             out.append((Plot(title, curves), present))
     return tuple(out)
+
+
+def _one_each(layout: Layout, part: str) -> list[tuple[Plot, tuple[str, ...]]]:
+    """Every angle of a part of the hand in a plot of its own."""
+    curve = Curve(_part_words(part), colours.of_part(f"{part}_"))
+    return [
+        (Plot(_angle_words(name.removeprefix(f"{part}_")), (curve,)), (name,))
+        for name in _group(layout, part)
+    ]
+
+
+def _group(layout: Layout, part: str) -> list[str]:
+    arm = ("wrist_", "elbow_", "forearm_", "ulnar_cmc_") if part == "wrist" else (f"{part}_",)
+    return [angle.name for angle in measured_angles(layout) if angle.name.startswith(arm)]
+
+
+def _part_words(part: str) -> str:
+    return _("wrist and forearm") if part == "wrist" else _finger(part)
+
+
+def _angle_words(name: str) -> str:
+    return {
+        "mcp_flexion": _("MCP flexion"),
+        "mcp_abduction": _("MCP abduction"),
+        "mcp_deviation_ulnar": _("MCP ulnar deviation"),
+        "pip_flexion": _("PIP flexion"),
+        "dip_flexion": _("DIP flexion"),
+        "cmc_flexion": _("CMC flexion"),
+        "cmc_abduction": _("CMC abduction"),
+        "cmc_rotation": _("CMC rotation"),
+        "ip_flexion": _("IP flexion"),
+        "flexion": _("wrist flexion"),
+        "deviation_ulnar": _("ulnar deviation"),
+        "elbow_flexion": _("elbow flexion"),
+        "forearm_pronation": _("forearm pronation"),
+        "ulnar_cmc_flexion": _("ulnar CMC flexion"),
+    }[name]
+
+
+def _signal_plots(sensor: str) -> tuple[Plot, ...]:
+    axes = tuple(Curve(axis, colours.of_index(i)) for i, axis in enumerate("xyz"))
+    return (
+        Plot(_("{sensor} gyroscope").format(sensor=sensor), axes, "°/s"),
+        Plot(_("{sensor} accelerometer").format(sensor=sensor), axes, "m/s²"),
+        Plot(_("{sensor} magnetometer").format(sensor=sensor), axes, "µT"),
+    )
 
 
 def _finger(name: str) -> str:

@@ -21,6 +21,9 @@ ALARM = (226, 75, 74)
 DEAD = (104, 108, 116)
 BOARD = (70, 92, 120)
 GHOST = (138, 146, 158)
+SKIN = (255, 233, 214)  # nobody's: it is to be told from every finger's colour
+SECOND = (132, 184, 255)  # the skin of a hand to compare with
+DOUBT = (96, 102, 112)  # hatching on skin
 LIT = (255, 236, 92)
 
 _CYCLE = (INDEX, THUMB, MIDDLE, LITTLE, RING, WRIST, FOREARM)

@@ -1,4 +1,4 @@
-"""A take's motion beside the one that is shown: by another filter, or smoothed."""
+"""A motion beside the one that is shown: by another filter, smoothed, or of another take."""
 
 from __future__ import annotations
 
@@ -6,31 +6,33 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 
-from app.channels import values_of
 from handstudio.arrays import Array
 from handstudio.hand_fit import HandFit, fit_of
-from handstudio.pipeline import Doubt, Motion
+from handstudio.pipeline import Motion
 from handstudio.setup import Setup, filter_named, smoothing
 
 SMOOTHED = "smoothed"
 """What a comparison is called that is with the smoothed take; others are names of filters."""
 
 
+OF_TAKE = "take:"
+"""Begins what a comparison is called that is with another take; its path follows."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """The second motion, and how far it is from the first.
+    """The second motion.
 
     Attributes:
-        name: Of the filter, or `SMOOTHED`.
+        name: Of the filter, or `SMOOTHED`, or what the other take is asked for by.
         setup: What it was computed by.
         motion: It.
         time_s: Its time axis, from its first instant.
         fit: Its hand, where there is one.
-        values: Its curves at the instants that are plotted [deg].
-        rms_deg: Of each curve's difference, over the plotted instants at which every sensor was
-            placed in both; NaN where there are none.
+        take: Name of the other take; empty: it is the same one.
+        later_s: How much later than the first take's the other's begin is laid.
     """
 
     name: str
@@ -38,12 +40,12 @@ class Comparison:
     motion: Motion
     time_s: Float[Array, " n"]
     fit: HandFit | None
-    values: Float[Array, "p c"]
-    rms_deg: Float[Array, " c"]
+    take: str = ""
+    later_s: float = 0.0
 
     def at(self, at_s: float) -> Motion:
         """The instant at a time of the take."""
-        index = int(_nearest(self.time_s, np.array([at_s]))[0])
+        index = int(nearest(self.time_s, np.array([at_s - self.later_s]))[0])
         return self.motion[index : index + 1]
 
 
@@ -60,20 +62,10 @@ def setup_of(name: str, own: Setup) -> Setup:
     return msgspec.structs.replace(own, filter=kept, smooth=False)
 
 
-def compared(
-    name: str, setup: Setup, motion: Motion, first: Motion, values: Float[Array, "p c"]
-) -> Comparison:
-    """A second motion beside a first, of which the plotted instants and their curves are given."""
-    time_s, wanted_s = seconds_of(motion), seconds_of(first)
-    second = picked(motion, _nearest(time_s, wanted_s))
-    mine = values_of(setup, second)
-    placed = ((first.doubt | second.doubt) & np.uint8(Doubt.UNPLACED) == 0).all(axis=1)
-    off = (mine - values + 180.0) % 360.0 - 180.0  # a turn more is no difference
-    rms = np.full(values.shape[1], np.nan)
-    if placed.any():
-        rms = np.sqrt(np.mean(np.square(off[placed]), axis=0))
+def compared(name: str, setup: Setup, motion: Motion, take: str = "") -> Comparison:
+    """A second motion beside the one that is shown; ``take`` names the other take, if it is one."""
     fit = fit_of(setup) if setup.layout.is_hand else None
-    return Comparison(name, setup, motion, time_s, fit, mine, rms)
+    return Comparison(name, setup, motion, seconds_of(motion), fit, take)
 
 
 def seconds_of(motion: Motion) -> Float[Array, " n"]:
@@ -81,12 +73,8 @@ def seconds_of(motion: Motion) -> Float[Array, " n"]:
     return np.asarray((motion.time_us - motion.time_us[0]) * 1e-6)
 
 
-def picked(motion: Motion, index: Array) -> Motion:
-    """Some instants of a motion."""
-    return Motion(*(getattr(motion, name)[index] for name in Motion.__slots__))
-
-
-def _nearest(time_s: Array, wanted_s: Array) -> Array:
+def nearest(time_s: Float[Array, " n"], wanted_s: Float[Array, " m"]) -> Int64[Array, " m"]:
+    """The instants that are nearest to some times."""
     after = np.clip(np.searchsorted(time_s, wanted_s), 1, max(len(time_s) - 1, 1))
     late = wanted_s - time_s[after - 1] > time_s[np.minimum(after, len(time_s) - 1)] - wanted_s
     return np.minimum(np.where(late, after, after - 1), len(time_s) - 1)

@@ -61,6 +61,10 @@ class Chooser:
         name = wanted_of(state)
         return PLAIN if name == BEST and not self._ready else name
 
+    def serves(self, chosen: AnyFilter) -> bool:
+        """Whether nobody has to wait for this filter here."""
+        return self._ready or not isinstance(chosen, type(FILTERS[BEST]))
+
     @property
     def _stands(self) -> Preparing:
         if self._ready or self.preparation is None:

@@ -139,6 +139,62 @@ class GoOn:
 
 
 @dataclass(frozen=True, slots=True)
+class ZoomPlots:
+    """So many times less time in the plots of the open take."""
+
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class PanPlots:
+    """The plots of the open take go on by this share of their time, or back."""
+
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShiftComparison:
+    """Lay the begin of the take that is compared with so much later than the open one's [s]."""
+
+    later_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class FitPlots:
+    """The part that counts fills the plots, or the whole take where it does already."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseCurves:
+    """Plot this set of curves; of signals, those of the sensor of this name."""
+
+    name: str
+    sensor: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class AddTake:
+    """Copy a take from elsewhere into the library: a file here, or one that a page sent."""
+
+    name: str
+    content: bytes | None = None  # None: the name is a path of this computer
+
+
+@dataclass(frozen=True, slots=True)
+class ShareTake:
+    """Send the open take and its notes to the page, as one file."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
+class TrimTake:
+    """The part of the open take that counts becomes a take of its own, called so."""
+
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class PutMark:
     """This moment is worth finding again, in the take that is recorded or open."""
 
@@ -435,6 +491,14 @@ Intent: TypeAlias = (
     | PagesOpen
     | PageShown
     | ToggleRecording
+    | ZoomPlots
+    | PanPlots
+    | ShiftComparison
+    | FitPlots
+    | ChooseCurves
+    | TrimTake
+    | AddTake
+    | ShareTake
     | OpenTake
     | RecoverTake
     | ShowLive

@@ -11,6 +11,7 @@ from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
 from app.solving import Answer, solve
+from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.export import export
 from handstudio.export.formats import format_named
@@ -18,6 +19,9 @@ from handstudio.export.part import Content, Processed, Window
 from handstudio.process import process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
+from handstudio.signals import signals
+from handstudio.survey import survey
+from handstudio.trim import trim
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
 _share: Synchronized[float] | None = None
@@ -68,6 +72,21 @@ class Jobs:
         self._reset()
         return self._pool.submit(_export, path, name, content, window, setup)
 
+    def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
+        """Find the stretches of a take's motion that want a second look."""
+        self._reset()
+        return self._pool.submit(_survey, path, setup)
+
+    def signals(self, path: Path) -> Future[None]:
+        """Write what the sensors of a take told: choosing it then finds it."""
+        self._reset()
+        return self._pool.submit(_signals, path)
+
+    def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> Future[Path]:
+        """Make a take of a part of one."""
+        self._reset()
+        return self._pool.submit(_trim, path, begin_s, end_s, name)
+
     def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
         """Compute what a course is for from its takes, and keep what is to be used from now on."""
         self._reset()
@@ -112,6 +131,18 @@ def _nothing() -> None:
 
 def _process(path: Path, setup: Setup | None) -> None:
     process(open_take(path), setup, progress=_tell)
+
+
+def _survey(path: Path, setup: Setup | None) -> tuple[Stretch, ...]:
+    return survey(open_take(path), setup, _tell)
+
+
+def _signals(path: Path) -> None:
+    signals(open_take(path), _tell)
+
+
+def _trim(path: Path, begin_s: float, end_s: float | None, name: str) -> Path:
+    return trim(open_take(path), begin_s, end_s, name=name, progress=_tell)
 
 
 def _export(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import sds_of, values_of
+from app.channels import OF_TAKES, OVERVIEW, sds_of, sets_of, values_of
 from handstudio.arrays import Array
 from handstudio.pipeline import Motion, empty, join
 from handstudio.setup import Setup
@@ -27,12 +27,20 @@ class LiveHistory:
     time_s: Float[Array, " n"]
     values: Float[Array, "n c"]
     sds: Float[Array, "n c"]  # [deg], inf where the filter does not tell
+    chosen: str = OVERVIEW
 
 
-def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion]) -> LiveHistory:
-    """Add what came since; begins anew with another setup."""
-    if history is None or history.setup is not setup:
-        history = _begun(setup)
+def extended(
+    history: LiveHistory | None, setup: Setup, motions: Sequence[Motion], chosen: str = OVERVIEW
+) -> LiveHistory:
+    """Add what came since; begins anew with another setup, or other curves.
+
+    Speeds and signals are of takes: in their place comes the overview.
+    """
+    live = chosen in sets_of(setup.layout) and chosen not in OF_TAKES
+    chosen = chosen if live else OVERVIEW
+    if history is None or history.setup is not setup or history.chosen != chosen:
+        history = _begun(setup, chosen)
     if not motions:
         return history
     motion = join(list(motions))
@@ -41,8 +49,8 @@ def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion
     if len(kept) == 0:
         return history
     time_s = np.concatenate([history.time_s, (kept.time_us - start) * 1e-6])
-    values = np.concatenate([history.values, values_of(setup, kept)])
-    sds = np.concatenate([history.sds, sds_of(setup, kept)])
+    values = np.concatenate([history.values, values_of(setup, kept, chosen)])
+    sds = np.concatenate([history.sds, sds_of(setup, kept, chosen)])
     recent = time_s >= time_s[-1] - SPAN_S
     return replace(
         history,
@@ -54,10 +62,10 @@ def extended(history: LiveHistory | None, setup: Setup, motions: Sequence[Motion
     )
 
 
-def _begun(setup: Setup) -> LiveHistory:
+def _begun(setup: Setup, chosen: str) -> LiveHistory:
     nothing = empty(len(setup.layout.sensors))
-    curves = values_of(setup, nothing), sds_of(setup, nothing)
-    return LiveHistory(setup, 0, np.iinfo(np.int64).min, np.empty(0), *curves)
+    curves = values_of(setup, nothing, chosen), sds_of(setup, nothing, chosen)
+    return LiveHistory(setup, 0, np.iinfo(np.int64).min, np.empty(0), *curves, chosen)
 
 
 def _thinned(motion: Motion, next_us: int) -> Motion:

@@ -39,6 +39,12 @@ sheet; farther away where whole arms move."""
 DESK_PLACE = (-0.15, -0.03, 0.46)
 DESK_TARGET = (0.0, 0.31, 0.0)
 
+FIELD_RAD = float(np.deg2rad(75.0))
+"""Of the camera from the bottom of the picture to its top: viser's own."""
+
+ABOVE_SHEET = 0.17
+"""By how much of the picture's height the hand stands above the middle while a take is open."""
+
 _AWAY = np.pi / 2  # y of the picture
 
 _DISTANCE = 1.8  # from the hand's middle, in hand lengths: the whole hand, with some air
@@ -81,6 +87,16 @@ def camera_for(view: View, skeleton: Skeleton | None, pose: Pose | None, yaw: fl
         View.FOLLOW: between(dorsal, -along, 0.35),
     }[view]
     return Camera(target + _DISTANCE * size * towards, target, along)
+
+
+def lowered(camera: Camera, share: float) -> Camera:
+    """Moved down by a share of the picture's height: what it looks at then stands higher in it."""
+    towards = camera.target - camera.place
+    distance = float(np.linalg.norm(towards))
+    upright = camera.up - towards * float(camera.up @ towards) / distance**2
+    height = 2.0 * distance * np.tan(FIELD_RAD / 2)
+    down = -share * height * upright / np.linalg.norm(upright)
+    return Camera(camera.place + down, camera.target + down, camera.up)
 
 
 def between(a: Array, b: Array, share: float) -> Array:

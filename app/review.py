@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import sds_of, values_of
-from app.comparison import Comparison, compared, picked, seconds_of
+from app.comparison import Comparison, compared, seconds_of
+from app.seen import Choice, Seen, seen
+from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.pipeline import Motion
 from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
+from handstudio.signals import Signals
 
-_PLOTTED = 1000  # instants in a plot of the whole take: more than it has pixels
+_NARROWEST_S = 0.2  # of time in the plots: a few instants
+_LEAD = 0.1  # share of the plots before the playhead, where it has played out of them
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
@@ -28,9 +31,10 @@ class Review:
     take: Take
     motion: Motion
     time_s: Float[Array, " n"]
-    plot_time_s: Float[Array, " p"]
-    plot_values: Float[Array, "p c"]
-    plot_sds: Float[Array, "p c"]  # [deg], inf where the filter does not tell
+    seen: Seen  # what the plots show, of the time from here
+    from_s: float
+    to_s: float
+    choice: Choice = Choice()
     at_s: float = 0.0
     playing: bool = False
     speed: float = 1.0
@@ -42,16 +46,15 @@ class Review:
     smooth: bool = False  # somebody wants it smoothed; it is once that is computed
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
+    signals: Signals | None = None  # None: nobody has asked for them yet
+    stretches: tuple[Stretch, ...] | None = None  # None: not known yet
+    ordered: frozenset[str] = frozenset()  # which of these two are on their way
+    partial: bool = False  # only the first seconds are there yet
 
     @property
     def setup(self) -> Setup:
         """What decided this motion."""
         return self.used or self.take.header.setup
-
-    @property
-    def plotted(self) -> Motion:
-        """The instants that are in the plots."""
-        return picked(self.motion, np.searchsorted(self.time_s, self.plot_time_s))
 
     @property
     def duration_s(self) -> float:
@@ -83,34 +86,53 @@ def opened(take: Take, motion: Motion, setup: Setup | None = None) -> Review:
     """
     if len(motion) == 0:
         raise _nothing_in(take)
-    time_s = seconds_of(motion)
-    shown = np.unique(np.linspace(0, len(time_s) - 1, _PLOTTED).round().astype(int))
-    by, few = setup or take.header.setup, picked(motion, shown)
-    curves = values_of(by, few), sds_of(by, few)
-    return Review(take, motion, time_s, time_s[shown], *curves, used=setup)
+    by, time_s = setup or take.header.setup, seconds_of(motion)
+    ends = 0.0, float(time_s[-1])
+    return Review(take, motion, time_s, seen(by, motion, time_s, ends, Choice()), *ends, used=setup)
 
 
 def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
     """The same take at the same place by another setup, compared with nothing yet."""
     new = opened(review.take, motion, setup)
-    same = {
-        name: getattr(review, name)
-        for name in ("playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare")
-    }
-    return replace(new, at_s=min(review.at_s, new.duration_s), **same)
+    names = ["playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare"]
+    names += ["choice", "signals"]
+    if not _is(review, 0.0, review.duration_s):
+        names += ["from_s", "to_s"]
+    same = {name: getattr(review, name) for name in names}
+    return seen_anew(replace(new, at_s=min(review.at_s, new.duration_s), **same))
 
 
-def compared_with(review: Review, setup: Setup, motion: Motion) -> Review:
-    """The take with the second motion that was asked for.
+def compared_with(review: Review, setup: Setup, motion: Motion, take: str = "") -> Review:
+    """The take with the second motion that was asked for; ``take`` names the other, if it is one.
 
     Raises:
         TakeError: nothing moves in it.
     """
     if len(motion) == 0:
         raise _nothing_in(review.take)
-    plotted = review.plotted
-    found = compared(review.compare, setup, motion, plotted, review.plot_values)
-    return replace(review, comparison=found)
+    return seen_anew(replace(review, comparison=compared(review.compare, setup, motion, take)))
+
+
+def shifted(review: Review, later_s: float) -> Review:
+    """The other take's begin is laid so much later than this one's."""
+    if review.comparison is None:
+        return review
+    return seen_anew(replace(review, comparison=replace(review.comparison, later_s=later_s)))
+
+
+def seen_anew(review: Review) -> Review:
+    """With the curves that are now to be seen."""
+    window = review.from_s, review.to_s
+    curves = seen(
+        review.setup,
+        review.motion,
+        review.time_s,
+        window,
+        review.choice,
+        signals=review.signals,
+        comparison=review.comparison,
+    )
+    return replace(review, seen=curves)
 
 
 def settled(review: Review) -> Review:
@@ -127,15 +149,16 @@ def advanced(review: Review, elapsed_s: float) -> Review:
         return review
     at = review.at_s + elapsed_s * review.speed
     if at < review.end_s:
-        return replace(review, at_s=at)
+        return followed(replace(review, at_s=at))
     if review.loop and review.end_s > review.in_s:
-        return replace(review, at_s=review.in_s)
-    return replace(review, at_s=review.end_s, playing=False)
+        return followed(replace(review, at_s=review.in_s))
+    return followed(replace(review, at_s=review.end_s, playing=False))
 
 
 def sought(review: Review, at_s: float) -> Review:
     """Go to a time, pausing."""
-    return replace(review, at_s=min(max(at_s, 0.0), review.duration_s), playing=False)
+    there = min(max(at_s, 0.0), review.duration_s)
+    return followed(replace(review, at_s=there, playing=False))
 
 
 def stepped(review: Review, instants: int) -> Review:
@@ -177,6 +200,49 @@ def at_next_mark(review: Review, *, forward: bool) -> Review:
         ahead = [at for at in marks if at > review.at_s + apart]
         return sought(review, min(ahead, default=review.duration_s))
     return sought(review, max((at for at in marks if at < review.at_s + apart), default=0.0))
+
+
+def zoomed(review: Review, factor: float) -> Review:
+    """So many times less time in the plots, about the playhead where it is in them."""
+    inside = review.from_s <= review.at_s <= review.to_s
+    middle = review.at_s if inside else (review.from_s + review.to_s) / 2.0
+    return _windowed(
+        review, *(middle + (end - middle) / factor for end in (review.from_s, review.to_s))
+    )
+
+
+def panned(review: Review, share: float) -> Review:
+    """On by this share of the time in the plots, or back."""
+    step = share * (review.to_s - review.from_s)
+    return _windowed(review, review.from_s + step, review.to_s + step)
+
+
+def fitted(review: Review) -> Review:
+    """The part that counts fills the plots; where it does already, the whole take does."""
+    part = review.in_s, review.end_s
+    return _windowed(review, *((0.0, review.duration_s) if _is(review, *part) else part))
+
+
+def followed(review: Review) -> Review:
+    """The plots turn over to where the playhead is."""
+    if review.from_s - 1e-9 <= review.at_s <= review.to_s + 1e-9:
+        return review
+    width = review.to_s - review.from_s
+    start = review.at_s - _LEAD * width
+    return _windowed(review, start, start + width)
+
+
+def _windowed(review: Review, from_s: float, to_s: float) -> Review:
+    """This window of time, as far as the take goes, in the plots."""
+    width = min(max(to_s - from_s, _NARROWEST_S), review.duration_s)
+    start = min(max(from_s, 0.0), review.duration_s - width)
+    if _is(review, start, start + width):
+        return review
+    return seen_anew(replace(review, from_s=start, to_s=start + width))
+
+
+def _is(review: Review, from_s: float, to_s: float) -> bool:
+    return abs(review.from_s - from_s) < 1e-6 and abs(review.to_s - to_s) < 1e-6
 
 
 def _nothing_in(take: Take) -> TakeError:

@@ -10,6 +10,7 @@ from app.boards import BOARD_M, Boards, boards_of
 from app.bones import BoneSet, bone_sets, hand_length, joint_radii
 from app.look import DESK_TARGET, Camera
 from app.meshes import mesh
+from app.skin import SkinNodes
 from app.views.course import GhostView
 from app.views.page import HandView, SensorsView
 from handstudio.arrays import Array
@@ -23,6 +24,8 @@ _BOARD_ALONE_M = 0.05  # drawn size of a sensor where there is no hand
 _APART_M = 0.12
 _AXES_M = 0.014
 _GHOSTLY = 0.5
+_SEE_THROUGH = 0.36  # skin over bones: both are to be seen
+_PALE_SKIN = 0.30
 _ABOVE = np.array([0.0, 0.02, 0.04])
 _MIDDLE = FINGERS.index("middle")
 _BESIDE = {side: np.array([x, 0.0, 0.0]) for side, x in (("right", -0.24), ("left", 0.24))}
@@ -37,6 +40,7 @@ class Scene:
         self._server = server
         self._root = server.scene.add_frame("/hand", show_axes=False)
         self._hand = _HandNodes(server)
+        self._skin = SkinNodes(server, "/hand/skin")
         self._ghost = _GhostNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
@@ -52,6 +56,7 @@ class Scene:
             case HandView():
                 self._clear_sensors()
                 self._hand.render(view, visible=shown.bones)
+                self._render_skin(view, shown)
                 self._boards.render(view, shown)
             case SensorsView():
                 self._clear_hand()
@@ -60,9 +65,9 @@ class Scene:
                 self._clear_hand()
                 self._clear_sensors()
 
-    def render_ghost(self, view: GhostView | None) -> None:
+    def render_ghost(self, view: GhostView | None, shown: Shown) -> None:
         """Show the hand that shows what is asked for, or none."""
-        self._ghost.render(view)
+        self._ghost.render(view, shown)
 
     def say(self, words: str) -> None:
         """Words in the middle of the picture; none: nothing."""
@@ -94,8 +99,19 @@ class Scene:
                 client.camera.position = camera.place
                 client.camera.look_at = camera.target
 
+    def _render_skin(self, view: HandView, shown: Shown) -> None:
+        """Bones are seen through skin, and tell what is in doubt; alone it tells so itself."""
+        if not shown.skin:
+            self._skin.hide()
+            return
+        opacity = _SEE_THROUGH if shown.bones else None
+        self._skin.render(view.skeleton, view.pose, colours.SKIN, opacity)
+        told = np.zeros_like(view.doubtful) if shown.bones else view.doubtful
+        self._skin.mark(view.pose, told, view.dead)
+
     def _clear_hand(self) -> None:
         self._hand.clear()
+        self._skin.clear()
         self._boards.clear()
 
     def _show_sensors(self, view: SensorsView) -> None:
@@ -231,23 +247,36 @@ class _GhostNodes:
         self._moving: Array | None = None
         self._sets: tuple[BoneSet, ...] = ()
         self._bones: dict[str, viser.BatchedMeshHandle] = {}
+        self._skin = SkinNodes(server, "/ghost/skin", shadow=False)
         self._label: viser.LabelHandle | None = None
 
-    def render(self, view: GhostView | None) -> None:
+    def render(self, view: GhostView | None, shown: Shown) -> None:
         if view is None:
             self.clear()
             return
         if view.skeleton is not self._skeleton or view.moving is not self._moving:
             self._build(view)
+        # in the place of the other hand its bones would hide that one's
+        apart = view.beside or not shown.skin
         for bones in self._sets:
             handle = self._bones[bones.mesh]
+            if handle.visible != apart:
+                handle.visible = apart
             q, t = bones.placed(view.pose)
             handle.batched_wxyzs, handle.batched_positions = q, t + _place(view)
+        if self._label is not None:
+            self._label.position = view.pose.t_world_tip[_MIDDLE] + _place(view) + _ABOVE
+        if shown.skin:
+            tint = colours.SKIN if view.beside else colours.SECOND
+            self._skin.render(view.skeleton, view.pose, tint, _PALE_SKIN, _place(view))
+        else:
+            self._skin.hide()
 
     def clear(self) -> None:
         for handle in self._bones.values():
             handle.remove()
         self._bones.clear()
+        self._skin.clear()
         if self._label is not None:
             self._label.remove()
             self._label = None
@@ -280,8 +309,7 @@ class _GhostNodes:
             self._label = self._server.scene.add_label(
                 "/ghost/words",
                 view.words,
-                position=view.pose.t_world_tip[_MIDDLE] + _place(view) + _ABOVE,
-                font_screen_scale=1.1,
+                font_screen_scale=1.1 if view.beside else 0.9,
                 anchor="bottom-center",
             )
 

@@ -124,13 +124,14 @@ class Server:
         view = scene_of(state)
         self._scene.furnish(dark=state.settings.theme == "dark")
         self._scene.render(view, state.yaw, state.settings.shown)
-        self._scene.render_ghost(ghost_view(state) or compared_ghost(state))
+        ghost = ghost_view(state) or compared_ghost(state)
+        self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.say(overlay_of(state))
-        # aimed when asked for, and when the picture is turned otherwise or a hand appears: from
-        # the desk all that looks the same
+        # aimed when asked for, when a take is opened or left, and when the picture is turned
+        # otherwise or a hand appears: from the desk all that looks the same
         fixed = state.view is View.DESK
         turned = None if fixed else (state.yaw, isinstance(view, HandView))
-        aimed = state.aimed, turned, looks_near(state)
+        aimed = state.aimed, turned, looks_near(state), state.review is not None
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))

@@ -17,6 +17,7 @@ from app import comparison, diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
+from app.channels import OVERVIEW, SIGNALS, sets_of
 from app.filtering import Chooser, Prepared
 from app.holding import Holder
 from app.jobs import Jobs, Stopped
@@ -24,12 +25,26 @@ from app.keeping import Keeper
 from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
 from app.review import Review
+from app.seen import Choice
 from app.solving import Answer
 from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
 from app.words import _
-from app.workshop import Computed, Exported, Gathered, Solved, Uncomputed, Workshop
+from app.workshop import (
+    Added,
+    Computed,
+    Exported,
+    Gathered,
+    Previewed,
+    Solved,
+    Surveyed,
+    Trimmed,
+    Uncomputed,
+    Workshop,
+    Written,
+)
+from handstudio.analysis.stretches import Stretch
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
@@ -38,6 +53,7 @@ from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
+    HeadingTaken,
     NotePage,
     Phase,
     ResetHeading,
@@ -56,6 +72,8 @@ from handstudio.recording.recovery import recover
 from handstudio.recording.take import Take, open_take
 from handstudio.settings import SettingsStore
 from handstudio.setup import HandModel, Setup
+from handstudio.signals import kept_signals
+from handstudio.survey import kept_survey
 from handstudio.wizards.course import Next, Redo
 
 _BLINK_MS = 3000
@@ -84,6 +102,7 @@ class Studio:
         self._workshop = Workshop(self.jobs)
         self._now_s = 0.0
         self._solving = False  # a calibration was ordered
+        self._sensor = ""  # whose signals are plotted
         self._toggled_s = self._guided_s = -1.0
         self._change()
         kept = [view for view in LASTING if view.value == self.store.settings.camera]
@@ -179,6 +198,13 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
+            case intents.AddTake(name=name, content=content):
+                self._workshop.add(name, content, self.state.sessions)
+            case intents.ShareTake(page=page):
+                if self.state.review is not None:
+                    self._workshop.share(self.state.review.take, page)
+            case intents.TrimTake(name=name):
+                self._trim(name)
             case intents.Smooth(on=on):
                 self._ask_of_review(smooth=on)
             case intents.Compare(name=name):
@@ -280,6 +306,10 @@ class Studio:
                 change(sounds=on)
             case intents.SetFilter(name=name):
                 change(filter=name)
+            case intents.ChooseCurves(name=name, sensor=sensor):
+                self._sensor = sensor or self._sensor
+                change(curves=name)
+                self._ask_of_review()
             case intents.SetTheme(dark=dark):
                 change(theme="dark" if dark else "light")
             case intents.SetLanguage(language=language):
@@ -295,7 +325,7 @@ class Studio:
                 return False
         return True
 
-    def _move(self, move: intents.Intent) -> None:
+    def _move(self, move: intents.Intent) -> None:  # noqa: PLR0912 - a list
         review = self.state.review
         if review is None:
             return
@@ -318,6 +348,14 @@ class Studio:
                 review = replace(review, loop=on)
             case intents.GoToMark(forward=forward):
                 review = reviewing.at_next_mark(review, forward=forward)
+            case intents.ZoomPlots(factor=factor):
+                review = reviewing.zoomed(review, factor)
+            case intents.PanPlots(share=share):
+                review = reviewing.panned(review, share)
+            case intents.ShiftComparison(later_s=later_s):
+                review = reviewing.shifted(review, later_s)
+            case intents.FitPlots():
+                review = reviewing.fitted(review)
         self.state = replace(self.state, review=review)
 
     def _find(self) -> None:
@@ -374,9 +412,6 @@ class Studio:
                 self._holder.use(which)
             case intents.ResetHeading(sensor=sensor):
                 self.capture.send(ResetHeading(sensor))
-                if self.state.newest.recorder is None:
-                    of = sensor or _("all sensors")
-                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
             case intents.OpenTake() | intents.ChooseSubject() | intents.DeleteSubject() if on:
                 raise HandstudioError(
                     "A course of calibration is on.", "Leave it first; it can be gone on with."
@@ -499,6 +534,8 @@ class Studio:
             self._show(reviewing.opened(take, motion))
             return
         self._workshop.compute(take)
+        if self._chooser.serves(take.header.setup.filter):
+            self._workshop.preview(take)
 
     def _ask_of_review(self, **asked: Any) -> None:
         if self.state.review is not None:
@@ -515,11 +552,48 @@ class Studio:
         if not review.compare:
             review = replace(review, comparison=None)
         elif review.comparison is None or review.comparison.name != review.compare:
-            second = comparison.setup_of(review.compare, own)
-            motion = self._motion_by(review.take, second)
-            if motion is not None:
-                review = reviewing.compared_with(review, second, motion)
-        self.state = replace(self.state, review=review)
+            review = self._beside(review)
+        self.state = replace(self.state, review=self._looked_through(review))
+
+    def _beside(self, review: Review) -> Review:
+        """With the motion that is compared with, where it is there; else it is ordered."""
+        if review.compare.startswith(comparison.OF_TAKE):
+            other = open_take(Path(review.compare.removeprefix(comparison.OF_TAKE)))
+            setup, name = other.header.setup, other.path.stem
+        else:
+            other, name = review.take, ""
+            setup = comparison.setup_of(review.compare, other.header.setup)
+        motion = self._motion_by(other, setup)
+        if motion is None:
+            return review
+        return reviewing.compared_with(review, setup, motion, name)
+
+    def _looked_through(self, review: Review) -> Review:
+        """With the curves that are chosen, and what is known of the stretches of the motion."""
+        layout, wanted = review.setup.layout, self.store.settings.curves
+        chosen = wanted if wanted in sets_of(layout) else OVERVIEW
+        sensor = layout.names.index(self._sensor) if self._sensor in layout.names else 0
+        signals, stretches = review.signals, review.stretches
+        if not review.partial:  # else all of it is on its way, and these afterwards
+            if chosen == SIGNALS and signals is None:
+                signals = kept_signals(review.take)
+            if stretches is None:
+                stretches = kept_survey(review.take, review.setup)
+            self._order(review, chosen == SIGNALS and signals is None, stretches is None)
+        ordered = review.ordered
+        if not review.partial:
+            ordered |= {"stretches", "signals"} if chosen == SIGNALS else {"stretches"}
+        choice = Choice(chosen, sensor)
+        return reviewing.seen_anew(
+            replace(review, choice=choice, signals=signals, stretches=stretches, ordered=ordered)
+        )
+
+    def _order(self, review: Review, signals: bool, stretches: bool) -> None:
+        """What of these is lacking and not on its way."""
+        if signals and "signals" not in review.ordered:
+            self._workshop.write_signals(review.take)
+        if stretches and "stretches" not in review.ordered:
+            self._workshop.look_through(review.take, review.used)
 
     def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
         motion = kept_motion(take, setup)
@@ -533,7 +607,8 @@ class Studio:
             notes = noting.load_notes(review.take.path)
         except HandstudioError as error:
             self._say(error)
-        self.state = replace(self.state, review=replace(review, notes=notes), yaw=None)
+        self.state = replace(self.state, yaw=None)
+        self._bring(replace(review, notes=notes))
 
     def _reopen(self, before: Path, path: Path) -> None:
         """A take that is open stays open where it is, under its other name."""
@@ -566,6 +641,11 @@ class Studio:
         window = Window(review.in_s, review.out_s)
         self._workshop.export(review.take.path, order, window, review.used)
 
+    def _trim(self, name: str) -> None:
+        review = self.state.review
+        if review is not None:
+            self._workshop.trim(review.take.path, review.in_s, review.out_s, name)
+
     def _send_diagnostics(self, page: int) -> None:
         settings = msgspec.to_builtins(self.store.settings)
         work = partial(
@@ -585,20 +665,24 @@ class Studio:
         motions = self.capture.drain()
         live, shaking = self.state.live, self.state.shaking
         if newest.setup is not None:
-            live = live_history.extended(live, newest.setup, motions)
+            live = live_history.extended(live, newest.setup, motions, self.store.settings.curves)
             sensors = len(newest.setup.layout.sensors)
             if shaking is None or shaking.q_world_sensor.shape[1] != sensors:
                 shaking = shaken.begin(sensors)
             shaking = shaken.heeded(shaking, motions)
         self.state = replace(self.state, newest=newest, live=live, shaking=shaking)
         for report in self.capture.reports():
-            if isinstance(report, TakeDone):
-                self._take_done(report.path)
-            else:
-                self._calibrator.take_failed(report)
-                self._sound(Sound.ALARM)
-                self._say(report)
-                self.refresh_takes()
+            match report:
+                case TakeDone(path=path):
+                    self._take_done(path)
+                case HeadingTaken(sensor=sensor):
+                    of = sensor or _("all sensors")
+                    self._tell(_("Heading taken anew: {sensors}.").format(sensors=of))
+                case HandstudioError():
+                    self._calibrator.take_failed(report)
+                    self._sound(Sound.ALARM)
+                    self._say(report)
+                    self.refresh_takes()
 
     def _take_done(self, path: Path) -> None:
         self.refresh_takes()
@@ -608,21 +692,38 @@ class Studio:
             _("Recorded {name}. Replay it below, export it under Review.").format(name=path.stem)
         )
         if self.state.newest.recorder is None:
-            try:
-                self._open(path)
-            except HandstudioError as error:
-                self._say(error)
+            self._open_or_say(path)
 
-    def _finish_work(self) -> None:
+    def _open_or_say(self, path: Path) -> None:
+        try:
+            self._open(path)
+        except HandstudioError as error:
+            self._say(error)
+
+    def _finish_work(self) -> None:  # noqa: PLR0912 - a list
         for outcome in self._workshop.done():
             match outcome:
                 case Computed(take=take, setup=None):
                     self._show_computed(take)
-                case Computed(take=take) if self._is_open(take):
+                case Computed(take=take) if self._is_open(take) or self._is_beside(take):
                     self._ask_of_review()
+                case Surveyed(take=take, setup=setup, stretches=found) if self._is_open(take):
+                    self._look_at(setup or take.header.setup, found)
+                case Written(take=take) if self._is_open(take):
+                    self._ask_of_review()
+                case Previewed(take=take, motion=motion) if self.state.review is None:
+                    self._show_head(take, motion)
+                case Added(path=path):
+                    self._tell(_("Added {name}.").format(name=path.stem))
+                    self.refresh_takes()
+                    self._open_or_say(path)
+                case Trimmed(path=path):
+                    self._tell(_("Trimmed: {name} is a take of its own.").format(name=path.stem))
+                    self.refresh_takes()
                 case Uncomputed(take=take, error=error):
                     self._tell_why(error)
-                    if self._is_open(take) and self.state.review is not None:
+                    here = self._is_open(take) or self._is_beside(take)
+                    if here and self.state.review is not None:
                         self._bring(reviewing.settled(self.state.review))
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
@@ -658,13 +759,33 @@ class Studio:
     def _is_open(self, take: Take) -> bool:
         return self.state.review is not None and self.state.review.take.path == take.path
 
+    def _is_beside(self, take: Take) -> bool:
+        review = self.state.review
+        return review is not None and review.compare == f"{comparison.OF_TAKE}{take.path}"
+
     def _show_computed(self, take: Take) -> None:
         motion = kept_motion(take)
+        review = self.state.review if self._is_open(take) else None
         try:
-            if motion is not None:
+            if motion is None:
+                return
+            if review is None:
                 self._show(reviewing.opened(take, motion))
+            elif review.partial:
+                self._bring(reviewing.computed_by(review, take.header.setup, motion))
+            else:
+                self._bring(review)
         except HandstudioError as error:
             self._say(error)
+
+    def _look_at(self, setup: Setup, found: tuple[Stretch, ...]) -> None:
+        review = self.state.review
+        if review is not None and review.setup == setup:
+            self.state = replace(self.state, review=replace(review, stretches=found))
+
+    def _show_head(self, take: Take, motion: Motion) -> None:
+        if len(motion) > 0:
+            self._show(replace(reviewing.opened(take, motion), partial=True))
 
     def _face_once(self) -> None:
         """Choose the turn of the picture when there is a first pose to choose it by."""

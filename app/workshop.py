@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -13,10 +14,18 @@ from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _
+from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.pipeline import Motion
+from handstudio.process import process_head
+from handstudio.recording.parcel import SUFFIX, pack, take_in
+from handstudio.recording.raw_import import import_folder
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
+
+_IMPORTED = "imported"
+"""Whose takes raw folders are that do not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +42,44 @@ class Uncomputed:
 
     take: Take
     error: HandstudioError
+
+
+@dataclass(frozen=True, slots=True)
+class Previewed:
+    """The first seconds of a take that is being computed."""
+
+    take: Take
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Surveyed:
+    """What wants a second look in this take, by its own setup or another."""
+
+    take: Take
+    setup: Setup | None
+    stretches: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What the sensors of this take told is there now."""
+
+    take: Take
+
+
+@dataclass(frozen=True, slots=True)
+class Trimmed:
+    """A part of a take is a take of its own."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Added:
+    """A take from elsewhere is in the library."""
+
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +103,9 @@ class Solved:
     answer: Answer | HandstudioError
 
 
-Outcome = Computed | Uncomputed | Exported | Gathered | Solved
+Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written) | (
+    Trimmed | Added | Exported | Gathered | Solved
+)
 
 
 @dataclass
@@ -98,6 +147,49 @@ class Workshop:
         words = smooth[not setup.smooth].format(name=take.path.stem)
         future = self.jobs.process(take.path, setup)
         self._pending.append(_Pending(future, lambda _result: Computed(take, setup), words, fail))
+
+    def preview(self, take: Take) -> None:
+        """The first seconds of a take, beside the computing of all of it."""
+        future = self._aside.submit(process_head, take)
+        words = _("Computing the motion of {name}").format(name=take.path.stem)
+        # behind what is waited for: its share is that of the whole
+        self._pending.append(_Pending(future, lambda motion: Previewed(take, motion), words))
+
+    def look_through(self, take: Take, setup: Setup | None) -> None:
+        """The stretches of a motion that is there already."""
+        words = _("Looking through {name}").format(name=take.path.stem)
+
+        def use(found: tuple[Stretch, ...]) -> Outcome:
+            return Surveyed(take, setup, found)
+
+        self._pending.append(_Pending(self.jobs.survey(take.path, setup), use, words))
+
+    def write_signals(self, take: Take) -> None:
+        """What the sensors of a take told."""
+        words = _("Reading the signals of {name}").format(name=take.path.stem)
+        future = self.jobs.signals(take.path)
+        self._pending.append(_Pending(future, lambda _result: Written(take), words))
+
+    def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> None:
+        """A part of a take as a take of its own."""
+        words = _("Trimming {name}").format(name=path.stem)
+        self._pending.append(_Pending(self.jobs.trim(path, begin_s, end_s, name), Trimmed, words))
+
+    def add(self, name: str, content: bytes | None, sessions: Path) -> None:
+        """A take from elsewhere."""
+        words = _("Copying {name}").format(name=Path(name).name)
+        future = self._aside.submit(_taken_in, name, content, sessions)
+        self._pending.append(_Pending(future, Added, words))
+
+    def share(self, take: Take, page: int) -> None:
+        """A take and its notes as one file."""
+        target = take.path.with_suffix(SUFFIX)
+
+        def use(written: Path) -> Outcome:
+            return Exported(Download(page, written.name, written))
+
+        words = _("Exporting {name}").format(name=target.name)
+        self._pending.append(_Pending(self._aside.submit(pack, take, target), use, words))
 
     def export(
         self,
@@ -150,3 +242,16 @@ class Workshop:
                     reason=repr(error),
                 )
                 yield one.fail(failed)
+
+
+def _taken_in(name: str, content: bytes | None, sessions: Path) -> Path:
+    """A file or folder of this computer, or what a page sent, in the library."""
+    path = Path(name).expanduser()
+    if content is None:
+        return (
+            import_folder(path, sessions, _IMPORTED) if path.is_dir() else take_in(path, sessions)
+        )
+    with tempfile.TemporaryDirectory(prefix="handstudio-") as place:
+        sent = Path(place) / (path.name or "sent")
+        sent.write_bytes(content)
+        return take_in(sent, sessions)

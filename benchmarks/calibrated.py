@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.checked import CHECK, CHECKS, Checks, checks
 from handstudio.arrays import Array
 from handstudio.calibration.chain_tree import UNCALIBRATED as ROUGH
 from handstudio.calibration.chain_tree import USUAL, Priors
@@ -18,7 +19,9 @@ from handstudio.calibration.opening import opened
 from handstudio.calibration.recorded import even
 from handstudio.calibration.sensors import calibrate_sensors
 from handstudio.calibration.solve import Found, found
-from handstudio.hand.skeleton import JOINTS, PARENTS
+from handstudio.calibration.subject import SubjectCalibration
+from handstudio.calibration.swings import Swings
+from handstudio.hand.skeleton import JOINTS, PARENTS, HandType
 from handstudio.layout import glove
 from handstudio.maths import so3
 from handstudio.recording.material import material
@@ -46,6 +49,8 @@ class Asked:
     imperfections: Imperfections
     sensors_first: bool = True  # the sensors' errors, by a tumble of the glove on another day
     priors: Priors = USUAL
+    check: bool = False  # whether it holds, some minutes later and after slips
+    hand_type: HandType = 3
 
 
 class Errors(msgspec.Struct, frozen=True):
@@ -57,6 +62,7 @@ class Errors(msgspec.Struct, frozen=True):
         link_mm: Of a link's length, and the standard deviation that was told.
         axis_deg: Of a flexion axis against the principal axis of the true rotation.
         frame_deg: And against the axis that the true frame is laid by.
+        checks: What checks of it read; None: none were done.
     """
 
     person: int
@@ -65,12 +71,47 @@ class Errors(msgspec.Struct, frozen=True):
     link_mm: dict[str, tuple[float, float]]
     axis_deg: dict[str, float]
     frame_deg: dict[str, float]
+    checks: Checks | None = None
 
 
 def run(asked: Asked) -> Errors:
     """Let a person do the course, calibrate, compare."""
-    hand, _, truth, labels = calibrated_hand(asked)
-    return _compared(asked.person, hand, truth, labels)
+    hand, known, truth, labels = calibrated_hand(asked)
+    errors = _compared(asked.person, hand, truth, labels)
+    if asked.check:
+        errors = msgspec.structs.replace(errors, checks=_checked(asked, hand, known))
+    return errors
+
+
+def kept(hand: Found, someone: Subject, name: str = "own") -> SubjectCalibration:
+    """A calibration as the studio would keep it."""
+    return SubjectCalibration(
+        id=name,
+        made_utc="",
+        software="",
+        subject=str(someone.number),
+        side=someone.side,
+        hand_length_m=someone.hand_length_m,
+        hand_type=hand.swings.layout.hand_type,
+        device="",
+        segments=hand.segments(),
+        tips=hand.tips(),
+        centres=hand.centres(),
+        axes=hand.functional_axes(),
+        rocking=hand.rocks(),
+    )
+
+
+def _checked(asked: Asked, hand: Found, known: DeviceCalibration | None) -> Checks:
+    someone, takes = subject(asked.person), []
+    for count in range(CHECKS):
+        seed = asked.seed + 1000 * (count + 1)
+        trajectory = perform(CHECK, Actor(someone, seed, material()))
+        samples, _ = _sensed(someone, asked, trajectory, occasion=0)
+        swings = _opened(asked, samples, trajectory, known)
+        (grasp,) = (span for span in trajectory.spans if span.name == "work")
+        takes.append((swings, _part(grasp.start_s, grasp.end_s)))
+    return checks(kept(hand, someone), takes)
 
 
 Labelled: TypeAlias = list[tuple[float, float, str]]
@@ -82,12 +123,24 @@ def calibrated_hand(asked: Asked) -> tuple[Found, DeviceCalibration | None, Trut
     known = _sensors(someone, asked) if asked.sensors_first else None
     trajectory = perform(COURSE, Actor(someone, asked.seed, material()))
     samples, truth = _sensed(someone, asked, trajectory, occasion=0)
-    labels = sorted((span.start_s, span.end_s, span.name) for span in trajectory.spans)
-    recorded = even([samples], RATE_HZ, known, glove().names)
-    swings = opened(glove(), float(RATE_HZ), recorded, labels, calibrated=known is not None)
+    labels = _labels(trajectory)
+    swings = _opened(asked, samples, trajectory, known)
     priors = ROUGH if known is None else asked.priors
     hand = found(swings, someone.side, someone.hand_length_m, priors)
     return hand, known, truth, labels
+
+
+def _labels(trajectory: Trajectory) -> Labelled:
+    return sorted((span.start_s, span.end_s, span.name) for span in trajectory.spans)
+
+
+def _opened(
+    asked: Asked, samples: ImuSamples, trajectory: Trajectory, known: DeviceCalibration | None
+) -> Swings:
+    layout = glove(hand_type=asked.hand_type)
+    recorded = even([samples], RATE_HZ, known, layout.names)
+    free, labels = known is not None, _labels(trajectory)
+    return opened(layout, float(RATE_HZ), recorded, labels, calibrated=free)
 
 
 def functional_frames(

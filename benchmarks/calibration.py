@@ -23,6 +23,9 @@ import tyro
 
 from benchmarks import heading, rig, sensor_errors, sloppy
 from benchmarks.calibrated import Asked, Errors, run
+from benchmarks.checked import figures
+from handstudio.calibration.checking import LIMIT_DEG, LIMIT_UNCALIBRATED_DEG
+from handstudio.hand.skeleton import HandType
 from handstudio.recording.material import RECORDINGS
 from handstudio.shell import out, print_table, progress
 from handstudio.simulation.imperfections.strengths import parse
@@ -52,6 +55,9 @@ def main(
     development: bool = False,
     budget: bool = True,
     others: bool = True,
+    check: bool = True,
+    sensors_first: bool = True,
+    hand_type: HandType = 3,
 ) -> None:
     """Measure.
 
@@ -62,20 +68,31 @@ def main(
         development: People and seeds that parameters may be chosen on, not those reported.
         budget: Try without one imperfection after the other, and without sensor calibration.
         others: Run the benchmarks of headings, sensors, sloppy courses and the real rig too.
+        check: See whether a check lets each calibration pass, and notices boards that slipped.
+        sensors_first: Calibrate the sensors before.
+        hand_type: How the palm is divided.
     """
     people = (DEVELOPMENT if development else REPORTING)[:subjects]
     seeds = 0 if development else 10_000
-    asked = [Asked(n, seeds + n, parse(imperfections)) for n in people]
+    asked = [
+        Asked(n, seeds + n, parse(imperfections), sensors_first, check=check, hand_type=hand_type)
+        for n in people
+    ]
     found: dict[str, Any] = {
         "imperfections": imperfections,
         "subjects": list(people),
         "development": development,
+        "sensors_first": sensors_first,
+        "hand_type": hand_type,
     }
     errors = _tried("calibrations", asked)
     found |= summed(errors)
+    if check:
+        limit = LIMIT_DEG if sensors_first else LIMIT_UNCALIBRATED_DEG
+        found["check"] = figures([one.checks for one in errors if one.checks], limit)
     found["people"] = [msgspec.to_builtins(one) for one in errors]
     if budget:
-        found["budget"] = _budget(asked[:2])
+        found["budget"] = _budget([replace(one, check=False) for one in asked[:2]])
     if others:
         found |= _others(people, development)
     _show(found)
@@ -192,6 +209,8 @@ def _show(found: dict[str, Any]) -> None:
             for name, case in found["budget"].items()
         ]
         print_table("Error budget, two people", ["", "centre", "worst", "link", "axis"], rows)
+    if "check" in found:
+        out.print(f"check: {found['check']}")
     for key in ("heading_sd_deg", "gyro_scale_pct", "sloppy", "lever_arm_scatter_mm"):
         if key in found:
             out.print(f"{key}: {found[key]}")

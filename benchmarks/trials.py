@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from benchmarks.calibrated import Asked, calibrated_hand, functional_frames
+from benchmarks.calibrated import Asked, calibrated_hand, functional_frames, kept
 from handstudio import pipeline
 from handstudio.analysis.hand_error import (
     HandPoints,
@@ -27,7 +27,6 @@ from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
 from handstudio.calibration.heading import CALIBRATED, UNCALIBRATED, Tolerances
 from handstudio.calibration.quick_start import quick_start
-from handstudio.calibration.solve import Found
 from handstudio.calibration.subject import Axis, Centre, Segment, SubjectCalibration, Tip
 from handstudio.hand.angles import hand_angles
 from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS, HandSide
@@ -196,7 +195,7 @@ def _own(trial: Trial, setup: Setup, runs: list[ImuSamples]) -> tuple[Setup, Han
     asked = Asked(trial.person, trial.seed, trial.imperfections)
     hand, known, course, labels = calibrated_hand(asked)
     functional = functional_frames(subject(trial.person), hand, course, labels)
-    setup = calibrated(setup, subject=_kept(hand, trial), sensors=known)
+    setup = calibrated(setup, subject=kept(hand, subject(trial.person, trial.side)), sensors=known)
     setup = _aligned(setup, trial, runs, CALIBRATED)
     return setup, fit_of(setup), functional
 
@@ -221,25 +220,6 @@ def _aligned(
         tolerances=tolerances,
     )
     return msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
-
-
-def _kept(hand: Found, trial: Trial) -> SubjectCalibration:
-    """A calibration as the studio would keep it."""
-    return SubjectCalibration(
-        id="own",
-        made_utc="",
-        software="",
-        subject=str(trial.person),
-        side=trial.side,
-        hand_length_m=subject(trial.person).hand_length_m,
-        hand_type=3,
-        device="",
-        segments=hand.segments(),
-        tips=hand.tips(),
-        centres=hand.centres(),
-        axes=hand.functional_axes(),
-        rocking=hand.rocks(),
-    )
 
 
 def _as_it_is(worn: Worn) -> SubjectCalibration:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypeAlias
 
+import msgspec
 import numpy as np
 
 from handstudio import __version__
@@ -18,11 +19,12 @@ from handstudio.calibration.quick_start import Labelled
 from handstudio.calibration.recorded import Recorded, even
 from handstudio.calibration.solve import found
 from handstudio.calibration.subject import SubjectCalibration
-from handstudio.calibration.swings import Swings, joined
+from handstudio.calibration.swings import Swings, is_there, joined
 from handstudio.calibration.verdict import Reading, Verdict
 from handstudio.calibration.watching import observe
 from handstudio.errors import CalibrationError
-from handstudio.hand.skeleton import HandSide
+from handstudio.hand.skeleton import HandSide, HandType
+from handstudio.layout import with_hand_type
 from handstudio.recording.calibrations import new_id
 from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
@@ -48,23 +50,33 @@ class Calibrated:
     to_repeat: tuple[str, ...]
 
 
-def calibrate(takes: Sequence[Take], progress: Progress = lambda _: None) -> Calibrated:
+def calibrate(
+    takes: Sequence[Take],
+    progress: Progress = lambda _: None,
+    hand_type: HandType | None = None,
+) -> Calibrated:
     """Calibrate a subject from the labels of takes; of a step done twice the last good one counts.
 
     The glove must have stayed on between them: what is computed is how it sits, too.
 
+    Args:
+        takes: The takes.
+        progress: Told how far it is.
+        hand_type: How the palm is divided; as the layout of the takes has it unless given.
+
     Raises:
         CalibrationError: the takes hold too little to calibrate anything, are of different people
             or hands, or of another glove.
+        LayoutError: the sensors cannot tell a hand of that type.
         TakeError: a take cannot be read.
     """
     _refuse_strangers(takes)
     courses = []
     for count, take in enumerate(takes):
-        courses.append(_course(take))
+        courses.append(_course(take, hand_type))
         progress(0.4 * (count + 1) / len(takes))
     verdicts = _verdicts(courses)
-    setup = takes[-1].header.setup
+    setup = courses[-1].setup
     swings = joined([_prepared(course, verdicts) for course in courses])
     _refuse_too_little(swings)
     progress(0.6)
@@ -80,7 +92,7 @@ def calibrate(takes: Sequence[Take], progress: Progress = lambda _: None) -> Cal
         subject=takes[-1].header.subject,
         side=side,
         hand_length_m=setup.hand.hand_length_m,
-        hand_type=3,
+        hand_type=setup.layout.hand_type,
         device=setup.device.serial_number if setup.device is not None else "",
         segments=hand.segments(),
         tips=hand.tips(),
@@ -109,8 +121,11 @@ class _Course:
     verdicts: dict[Labelled, Verdict]
 
 
-def _course(take: Take) -> _Course:
+def _course(take: Take, hand_type: HandType | None) -> _Course:
     setup, labels = take.header.setup, stretches(take.path)
+    if hand_type is not None:
+        layout = with_hand_type(setup.layout, hand_type)
+        setup = msgspec.structs.replace(setup, layout=layout)
     if not any(name in _STEPS for _, _, name in labels):
         raise CalibrationError(
             "{take}: no part of it is labelled as a step of a calibration.",
@@ -120,7 +135,9 @@ def _course(take: Take) -> _Course:
         )
     recorded = even(take.runs(), setup.rate_hz, setup.sensors, setup.layout.names)
     verdicts = {
-        label: _judged(setup, recorded, labels, label) for label in labels if label[2] in _STEPS
+        label: _judged(setup, recorded, labels, label)
+        for label in labels
+        if label[2] in _STEPS and is_there(setup.layout, label[2])
     }
     return _Course(setup, recorded, labels, verdicts)
 

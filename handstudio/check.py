@@ -16,6 +16,7 @@ from handstudio.calibration.verdict import Verdict
 from handstudio.errors import CalibrationError
 from handstudio.recording.notes import stretches
 from handstudio.recording.take import Take
+from handstudio.setup import calibrated
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +54,8 @@ def check(takes: Sequence[Take], calibration: SubjectCalibration | None = None) 
             side=flat.header.setup.layout.side,
             other=known.side,
         )
-    lying = _prepared(flat)
-    bending = lying if flat is grasped else _prepared(grasped)
+    lying = _prepared(flat, known)
+    bending = lying if flat is grasped else _prepared(grasped, known)
     rate_hz, (start, end) = bending.rate_hz, _labels(grasped, GRASP.name)[-1][:2]
     free = flat.header.setup.sensors is not None
     return Checked(
@@ -84,8 +85,8 @@ def _labels(take: Take, only: str) -> list[tuple[float, float, str]]:
     return [stretch for stretch in stretches(take.path) if stretch[2] == only]
 
 
-def _prepared(take: Take) -> Swings:
-    setup = take.header.setup
+def _prepared(take: Take, calibration: SubjectCalibration) -> Swings:
+    setup = calibrated(take.header.setup, subject=calibration, sensors=take.header.setup.sensors)
     recorded = even(take.runs(), setup.rate_hz, setup.sensors, setup.layout.names)
     return opened(
         setup.layout,

@@ -16,8 +16,9 @@ from typing import Annotated, Any, Literal
 import msgspec
 import tyro
 
+from handstudio.calibration.correction import CorrectionFilter
 from handstudio.commands import calibration as calibration_commands
-from handstudio.commands import exporting, keeping
+from handstudio.commands import exporting, keeping, sharing
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.aligning import aligned
 from handstudio.commands.arguments import Json, Sessions, TakeFile
@@ -30,7 +31,7 @@ from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeErro
 from handstudio.export.export import export
 from handstudio.export.formats import FORMATS
 from handstudio.export.part import Processed
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandType
 from handstudio.health.record import TakeHealth
 from handstudio.process import process as process_take
 from handstudio.recording import library
@@ -41,7 +42,7 @@ from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import health_of_take
 from handstudio.settings import load_settings, settings_path
-from handstudio.setup import HandModel, filter_named, smoothing
+from handstudio.setup import HandModel, divided, filter_named, smoothing
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 CONNECT_S = 25.0
@@ -172,6 +173,8 @@ def process(
     *,
     filter: str | None = None,
     smooth: bool = False,
+    correction: bool = False,
+    hand_type: HandType | None = None,
     from_start: bool = False,
     calibration: str | None = None,
     sensors: str | None = None,
@@ -186,6 +189,9 @@ def process(
         filter: Another filter than the take was recorded with (tree, vqf, raw, filter1 to
             filter4).
         smooth: Take in what came after every instant as well: the tree filter's smoother.
+        correction: Filter what each sensor puts out before fusion, as the thesis does (a low-pass).
+        hand_type: How the palm is divided: 1, one block; 2, two from the wrist; 3, one hinged to
+            the other. As in the take, or its calibration, unless given.
         from_start: Ignore what the studio knew before the first byte of the take.
         calibration: File of another subject calibration than the take carries, or none.
         sensors: File of another calibration of the sensors than the take carries, or none.
@@ -199,10 +205,14 @@ def process(
     for path in takes:
         take = open_take(path)
         setup = calibration_commands.chosen(take.header.setup, calibration, sensors)
+        if hand_type is not None:
+            setup = divided(setup, hand_type)
         if align:
             setup = aligned(take, setup)
         if filter is not None:
             setup = msgspec.structs.replace(setup, filter=filter_named(filter))
+        if correction:
+            setup = msgspec.structs.replace(setup, correction=CorrectionFilter())
         if smooth:
             setup = smoothing(setup)
         with progress(path.name, quiet=json) as share:
@@ -317,6 +327,9 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "noise": noise,
     "takes": keeping.takes,
     "rename": keeping.rename,
+    "trim": sharing.trim,
+    "share": sharing.share,
+    "add": sharing.add,
     "bin": keeping.bin,
     "restore": keeping.restore,
     "subjects": keeping.subjects,

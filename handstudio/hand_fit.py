@@ -17,9 +17,12 @@ from handstudio.fusion.mechanism import AS_SHIPPED, CALIBRATED, FREE, Mechanism,
 from handstudio.hand.skeleton import (
     FINGERS,
     JOINTS,
+    PARENTS,
     SEGMENTS,
+    WRIST_ULNAR,
     HandSide,
     Skeleton,
+    joints_of,
     nominal_skeleton,
 )
 from handstudio.hand.skin import Skin, skin_of
@@ -46,6 +49,8 @@ class HandFit:
 def fit_of(setup: Setup) -> HandFit:
     """The hand a setup describes: the calibrated one, else mean proportions of its length.
 
+    The same object for the same setup, as long as it is among those asked about last.
+
     Raises:
         LayoutError: the layout is not a hand's.
     """
@@ -56,9 +61,9 @@ def fit_of(setup: Setup) -> HandFit:
             why=setup.layout.no_hand,
         )
     if setup.subject is not None:
-        return fit_of_calibration(setup.subject, setup.layout)
+        return _calibrated(_Same(setup))
     side: HandSide = "left" if setup.layout.side == "left" else "right"
-    skeleton = nominal_skeleton(side, setup.hand.hand_length_m)
+    skeleton = nominal_skeleton(side, setup.hand.hand_length_m, setup.layout.hand_type)
     return HandFit(skeleton, nominal_mounting(setup.layout))
 
 
@@ -69,7 +74,7 @@ def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandF
     """
     known = {segment.name: segment for segment in calibration.segments}
     tips = {tip.finger: tip for tip in calibration.tips}
-    nominal = nominal_skeleton(calibration.side, calibration.hand_length_m)
+    nominal = nominal_skeleton(calibration.side, calibration.hand_length_m, calibration.hand_type)
     joint, rest = nominal.t_parent_joint.copy(), nominal.q_parent_rest.copy()
     for index, name in enumerate(SEGMENTS):
         if name in known:
@@ -96,7 +101,8 @@ def skin_of_calibration(calibration: SubjectCalibration, layout: Layout) -> Skin
         for s in calibration.segments
         if s.name in drivers and names[drivers[s.name]] == s.sensor
     }
-    joints = {joint.name for joint in JOINTS if {joint.parent, joint.child} <= set(on.values())}
+    both = joints_of(layout.hand_type)
+    joints = {joint.name for joint in both if {joint.parent, joint.child} <= set(on.values())}
     rocking = [(on[r.sensor], r.joint, r.share) for r in calibration.rocking if r.sensor in on]
     swung = {axis.joint for axis in calibration.axes} & joints
     return skin_of([rock for rock in rocking if rock[1] in joints], by_hand="wrist" in swung)
@@ -120,6 +126,13 @@ class _Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and other.setup is self.setup
+
+
+@lru_cache(maxsize=16)
+def _calibrated(same: _Same) -> HandFit:
+    setup = same.setup
+    assert setup.subject is not None
+    return fit_of_calibration(setup.subject, setup.layout)
 
 
 @lru_cache(maxsize=16)
@@ -192,7 +205,6 @@ def hand_mechanism(
     joint_before = {joint.child: joint for joint in layout.joints}
     known = {} if calibration is None else {axis.joint: axis.sd_rad for axis in calibration.axes}
     for sensor, place in enumerate(layout.sensors):
-        k = SEGMENTS.index(place.segment)
         q_sensor_segment = fit.q_sensor_segment[sensor]
         found.q_sensor_joint[sensor] = q_sensor_segment
         found.t_sensor_joint[sensor] = so3.rotate(q_sensor_segment, -t_segment_sensor[sensor])
@@ -203,7 +215,7 @@ def hand_mechanism(
             continue
         parent = drivers[joint.parent]
         axes = FREE if joint.name in _SADDLES else joint.axes
-        rest, centre = fit.skeleton.q_parent_rest[k], fit.skeleton.t_parent_joint[k]
+        rest, centre = _seen_from(fit.skeleton, joint.parent, place.segment)
         q_parent_segment = fit.q_sensor_segment[parent]
         found.parent[sensor], found.axes[sensor] = parent, axes
         found.q_parent_joint[sensor] = so3.multiply(q_parent_segment, rest)
@@ -212,6 +224,17 @@ def hand_mechanism(
         )
         found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
     return found
+
+
+def _seen_from(skeleton: Skeleton, parent: str, segment: str) -> tuple[Array, Array]:
+    """Attitude and joint of a segment at rest, in one that carries it, however many lie between."""
+    k = SEGMENTS.index(segment)
+    rest, centre = skeleton.q_parent_rest[k], skeleton.t_parent_joint[k]
+    while (k := PARENTS[k]) > 0 and SEGMENTS[k] != parent:
+        q = skeleton.q_parent_rest[k]
+        rest = so3.multiply(q, rest)
+        centre = skeleton.t_parent_joint[k] + so3.rotate(q, centre)
+    return rest, centre
 
 
 _FIRST_IN_CHAIN = {"thumb": "SN3", "index": "SN1", "middle": "SN1", "ring": "SN2", "little": "SN2"}
@@ -227,6 +250,8 @@ def _chain_root(layout: Layout, segment: str) -> int:
 
 _SADDLES = ("thumb_cmc",)
 """Joints whose two axes turn the bone about its own as well: opposition."""
+
+_WRISTS = ("wrist", WRIST_ULNAR.name)
 
 _LEVER_SD_M = {False: 0.010, True: 0.003}
 _AXIS_SD_NOMINAL = float(np.deg2rad(8.0))
@@ -244,7 +269,7 @@ def _axis_sd(joint: str, axes: int, known: dict[str, float], calibrated: bool) -
     own = known.get(joint, _AXIS_SD_NOMINAL) if calibrated else _AXIS_SD_NOMINAL
     parts = [own, _SKIN_SD]
     if axes > 1:
-        parts.append(_FOREARM_LAG_SD if joint == "wrist" else _OFF_AXES_SD)
+        parts.append(_FOREARM_LAG_SD if joint in _WRISTS else _OFF_AXES_SD)
     return float(np.linalg.norm(parts))
 
 

@@ -13,10 +13,9 @@ from handstudio.hand.angles import (
     Angle,
     hand_angles,
     joint_angles,
-    joint_index,
 )
 from handstudio.hand.pose import Pose, posed
-from handstudio.hand.skeleton import PARENTS, SEGMENTS
+from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton, joints_of
 from handstudio.hand.skin import taken_off
 from handstudio.hand_fit import HandFit, fit_of, skin_of_calibration
 from handstudio.layout import Layout
@@ -42,11 +41,18 @@ def segment_attitudes(
     driven = [index for index, name in enumerate(SEGMENTS) if name in drivers]
     sensors = [drivers[SEGMENTS[index]] for index in driven]
     out[:, driven] = so3.multiply(q_world_sensor[:, sensors], q_sensor_segment[sensors])
+    carried = sorted(set(range(len(SEGMENTS))) - set(driven))
+    _carry(skeleton, carried, out)
     if fit.skin is not None:
         out = taken_off(fit.skin, skeleton, out)
-    for index in sorted(set(range(len(SEGMENTS))) - set(driven)):
-        out[:, index] = so3.multiply(out[:, PARENTS[index]], skeleton.q_parent_rest[index])
+        _carry(skeleton, carried, out)
     return out
+
+
+def _carry(skeleton: Skeleton, segments: Sequence[int], q_world_segment: Array) -> None:
+    for index in segments:
+        above = q_world_segment[:, PARENTS[index]]
+        q_world_segment[:, index] = so3.multiply(above, skeleton.q_parent_rest[index])
 
 
 def pose_of(
@@ -62,15 +68,17 @@ def pose_of(
 
 
 def measured_angles(layout: Layout) -> tuple[Angle, ...]:
-    """The angles between segments that both carry a sensor; root angles need only the forearm."""
-    drivers = layout.drivers
+    """The angles between segments that both carry a sensor; root angles need only the forearm.
 
-    def measured(angle: Angle) -> bool:
-        child = joint_index(angle.joint)
-        parent = PARENTS[child]
-        return SEGMENTS[child] in drivers and (parent < 0 or SEGMENTS[parent] in drivers)
-
-    return tuple(angle for angle in hand_angles() if layout.is_hand and measured(angle))
+    A palm that is not hinged has no angle of its own, and where it is one block the ring and little
+    finger turn on the hand.
+    """
+    if not layout.is_hand:
+        return ()
+    carrying = {None, *layout.drivers}
+    joints = joints_of(layout.hand_type)
+    measured = {j.name for j in joints if {j.parent, j.child} <= carrying}
+    return tuple(angle for angle in hand_angles() if angle.joint in measured)
 
 
 def angles_of(

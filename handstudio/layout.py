@@ -11,18 +11,25 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from handstudio.errors import LayoutError
-from handstudio.hand.skeleton import JOINTS, SEGMENTS
+from handstudio.hand.skeleton import SEGMENTS, ULNAR, HandType, joints_of
 
 _REMEDY = "Correct the layout and try again; docs/import.md shows a complete one."
 _INSTEAD = "Export orientations instead."
 _SIDES = ("left", "right", "unknown")
 
 
-class SensorPlace(msgspec.Struct, frozen=True):
-    """A sensor by name and the segment it sits on."""
+class SensorPlace(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A sensor by name and the segment it sits on.
+
+    Attributes:
+        sensor: Its name.
+        segment: What it sits on.
+        second: It does not define its segment while another sensor there can.
+    """
 
     sensor: str
     segment: str
+    second: bool = False
 
 
 class JointPlace(msgspec.Struct, frozen=True):
@@ -52,10 +59,23 @@ class Layout(msgspec.Struct, frozen=True):
     @property
     def drivers(self) -> dict[str, int]:
         """The sensor that defines each instrumented segment: the first one listed on it."""
+        return self.drivers_among(range(len(self.sensors)))
+
+    def drivers_among(self, sensors: Sequence[int]) -> dict[str, int]:
+        """The same of these sensors alone, given in order."""
         drivers: dict[str, int] = {}
-        for index, place in enumerate(self.sensors):
-            drivers.setdefault(place.segment, index)
+        for index in sorted(sensors, key=lambda index: self.sensors[index].second):
+            drivers.setdefault(self.sensors[index].segment, index)
         return drivers
+
+    @property
+    def hand_type(self) -> HandType:
+        """How the palm is divided, by what its blocks and the two ulnar fingers hang on."""
+        parent = {joint.child: joint.parent for joint in self.joints}
+        if parent.get(ULNAR) == "forearm":
+            return 2
+        fingers = {parent.get(f"{finger}_proximal") for finger in ("ring", "little")}
+        return 1 if "hand" in fingers and ULNAR not in fingers else 3
 
     @property
     def instrumented_joints(self) -> tuple[JointPlace, ...]:
@@ -66,7 +86,7 @@ class Layout(msgspec.Struct, frozen=True):
     @property
     def is_hand(self) -> bool:
         """Whether the hand views, joint angles by name and positions apply."""
-        known = {joint.name for joint in JOINTS}
+        known = {joint.name for joint in joints_of(self.hand_type)}
         return (
             self.side in ("left", "right")
             and all(joint.name in known for joint in self.joints)
@@ -188,19 +208,74 @@ _GLOVE = {
 }
 
 
-def glove(side: str = "right", sensors: Sequence[str] | None = None) -> Layout:
-    """The layout of the glove: all twenty sensors, or those named, in the order given.
+def glove(
+    side: str = "right",
+    sensors: Sequence[str] | None = None,
+    hand_type: HandType | None = None,
+) -> Layout:
+    """The layout of the glove.
+
+    Args:
+        side: Which hand.
+        sensors: Names, in order; all twenty unless given.
+        hand_type: How the palm is divided. Unless given it is 3, and 1 for a glove that has no
+            sensor on the ulnar block: nothing tells how that lies then.
 
     Raises:
-        LayoutError: a name is not one of the glove's.
+        LayoutError: a name is not one of the glove's, or the type needs a sensor that is not there.
     """
     names = [f"SN{n}" for n in range(1, 21)] if sensors is None else list(sensors)
     unknown = [name for name in names if name not in _GLOVE]
     if unknown:
         raise LayoutError("The glove has no sensor {sensors}.", _REMEDY, sensors=", ".join(unknown))
+    divided = any(_GLOVE[name] == ULNAR for name in names)
+    if hand_type not in (None, 1) and not divided:
+        raise LayoutError(
+            "A hand of type {hand_type} needs a sensor on {segment}.",
+            "Choose hand type 1.",
+            hand_type=hand_type,
+            segment=ULNAR,
+        )
+    divided = divided and hand_type != 1
     joints = tuple(
         JointPlace(joint.name, joint.parent, joint.child, joint.axes)
-        for joint in JOINTS
+        for joint in joints_of(hand_type or (3 if divided else 1))
         if joint.parent is not None
     )
-    return Layout(side, tuple(SensorPlace(name, _GLOVE[name]) for name in names), joints)
+    return Layout(side, tuple(_place(name, divided) for name in names), joints)
+
+
+def with_hand_type(layout: Layout, hand_type: HandType) -> Layout:
+    """A glove's layout with the palm divided otherwise.
+
+    Raises:
+        LayoutError: it has a tree of its own, or no sensor that the type needs.
+    """
+    if layout.hand_type == hand_type:
+        return layout
+    if not _is_gloves(layout):
+        raise LayoutError(
+            "This layout has a tree of its own: its hand type is {own}, not {wanted}.",
+            "Write the joints of the other type into layout.toml; docs/import.md shows how.",
+            own=layout.hand_type,
+            wanted=hand_type,
+        )
+    return glove(layout.side, layout.names, hand_type)
+
+
+def divisible(layout: Layout) -> bool:
+    """Whether its palm can be divided in all three ways: a glove's, with an ulnar sensor."""
+    return _is_gloves(layout) and any(_GLOVE[name] == ULNAR for name in layout.names)
+
+
+def _is_gloves(layout: Layout) -> bool:
+    names = layout.names
+    known = bool(names) and set(names) <= _GLOVE.keys()
+    return known and layout == glove(layout.side, names, layout.hand_type)
+
+
+def _place(name: str, divided: bool) -> SensorPlace:
+    segment = _GLOVE[name]
+    if segment == ULNAR and not divided:  # one block, and SN11 stands for it
+        return SensorPlace(name, "hand", second=True)
+    return SensorPlace(name, segment)

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int64, UInt8
 
 from handstudio.arrays import Array
+from handstudio.calibration.correction import CorrectionState
 from handstudio.calibration.device import corrected
 from handstudio.calibration.rest import REST_S, Rest, first_rest
 from handstudio.errors import SetupError
@@ -77,6 +78,7 @@ class State:
     heard_us: Int64[Array, " s"]  # when each sensor answered last
     clock_offset_us: int  # what continues the time axis over restarts of the device
     resume_at_us: int | None  # after a restart: where on the time axis its first sample belongs
+    correction: CorrectionState | None = None  # of a setup that corrects what sensors put out
 
 
 def begin(setup: Setup) -> State:
@@ -91,6 +93,7 @@ def begin(setup: Setup) -> State:
         heard_us=np.zeros(sensors, dtype=np.int64),
         clock_offset_us=0,
         resume_at_us=None,
+        correction=_uncorrected(setup),
     )
 
 
@@ -196,7 +199,7 @@ def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[
     for start, end in pairwise(cuts):
         if end == start:
             continue
-        part = samples[start:end]
+        part, state = _corrected(setup, state, samples[start:end], stretch[start:end])
         if stretch[start] > _JUMP:
             state, stretch[start] = _over_gap(setup, state, part, stretch[start])
             flag = Doubt.AFTER_GAP
@@ -206,6 +209,25 @@ def _run_samples(setup: Setup, state: State, samples: ImuSamples, motions: list[
         state = _run_unbroken(setup, state, part, stretch[start:end], motions)
         motions[first].doubt[0] |= np.uint8(flag)
     return state
+
+
+def _corrected(
+    setup: Setup, state: State, samples: ImuSamples, stretch: Array
+) -> tuple[ImuSamples, State]:
+    """Signals as the thesis's filter of single outputs has them, where the setup asks for it."""
+    if setup.correction is None or state.correction is None:
+        return samples, state
+    before = state.correction
+    if stretch[0] > BRIDGE_S * setup.rate_hz:  # nothing is left of what was read before
+        before = setup.correction.restart(before)
+    samples, after = setup.correction.run(before, samples, stretch)
+    return samples, replace(state, correction=after)
+
+
+def _uncorrected(setup: Setup) -> CorrectionState | None:
+    if setup.correction is None:
+        return None
+    return setup.correction.begin(len(setup.layout.sensors), setup.rate_hz)
 
 
 def _run_unbroken(
@@ -323,6 +345,7 @@ def _over_gap(setup: Setup, state: State, after: ImuSamples, periods: float) -> 
 def _after_restart(setup: Setup, state: State, elapsed_us: int) -> State:
     newest = state.last.time_us
     state = _unplaced(state, setup.filter.restart(state.filter))
+    state = replace(state, correction=_uncorrected(setup))
     if len(newest) == 0:
         return state
     # the new epoch has a clock of its own; only the host knows how long the device was away
@@ -368,6 +391,7 @@ class _Packed(msgspec.Struct):
     heard_us: list[int]
     clock_offset_us: int
     resume_at_us: int | None
+    correction: bytes | None = None
 
 
 def pack(setup: Setup, state: State) -> bytes:
@@ -383,6 +407,7 @@ def pack(setup: Setup, state: State) -> bytes:
             state.heard_us.tolist(),
             state.clock_offset_us,
             state.resume_at_us,
+            _packed_correction(setup, state.correction),
         )
     )
 
@@ -410,7 +435,18 @@ def unpack(setup: Setup, packed: bytes) -> State:
         np.array(got.heard_us, dtype=np.int64),
         got.clock_offset_us,
         got.resume_at_us,
+        _unpack_correction(setup, got.correction),
     )
+
+
+def _packed_correction(setup: Setup, state: CorrectionState | None) -> bytes | None:
+    return None if setup.correction is None or state is None else setup.correction.pack(state)
+
+
+def _unpack_correction(setup: Setup, packed: bytes | None) -> CorrectionState | None:
+    if setup.correction is None or packed is None:
+        return _uncorrected(setup)
+    return setup.correction.unpack(packed)
 
 
 def _pack_samples(samples: ImuSamples) -> _PackedSamples:

@@ -86,6 +86,24 @@ def process(
     return motion
 
 
+def process_head(take: Take, seconds: float = 10.0) -> Motion:
+    """The motion of a take's first seconds, in memory: to look at until all of it is there.
+
+    Raises:
+        TakeError: the take is damaged.
+        SetupError: the stored state does not fit this version.
+    """
+    setup = take.header.setup
+    state, motions, wanted = first_state(take, setup), [], seconds * setup.rate_hz
+    for events in take.events():
+        motion, state = pipeline.run(setup, state, events)
+        motions.append(motion)
+        wanted -= len(motion)
+        if wanted <= 0.0:
+            break
+    return pipeline.join(motions) if motions else pipeline.empty(len(setup.layout.sensors))
+
+
 def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
     """The motion of a take where it was computed before and is whole, else None.
 

@@ -32,7 +32,7 @@ QUIET_S = 1.0
 class Shown(msgspec.Struct, frozen=True):
     """What of the hand is drawn."""
 
-    skin: bool = False
+    skin: bool = True
     bones: bool = True
     sensors: bool = True
     axes: bool = False
@@ -57,6 +57,7 @@ class Settings(msgspec.Struct, frozen=True):
         hand_length_mm: Of a subject whose hand was not measured.
         plot_span_s: How much time live plots show.
         filter: Name of the live filter; empty: whatever suits the device.
+        curves: Name of the set of curves that is plotted.
     """
 
     language: str = ""
@@ -73,6 +74,7 @@ class Settings(msgspec.Struct, frozen=True):
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3
     plot_span_s: float = 10.0
     filter: str = ""
+    curves: str = "overview"
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

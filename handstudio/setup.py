@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import msgspec
 
+from handstudio.calibration.correction import CorrectionFilter
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import CalibrationError, SetupError
@@ -15,8 +16,8 @@ from handstudio.fusion.filter1 import Filter1
 from handstudio.fusion.raw import RawFilter
 from handstudio.fusion.tree_filter import TreeFilter
 from handstudio.fusion.vqf_filter import VqfFilter
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
-from handstudio.layout import Layout, glove
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandType
+from handstudio.layout import Layout, divisible, glove, with_hand_type
 from handstudio.protocol.packets import Description, sensor_name
 from handstudio.samples import Ranges
 
@@ -70,9 +71,8 @@ class JointGeometry(msgspec.Struct, frozen=True):
 
 
 class HandModel(msgspec.Struct, frozen=True):
-    """The hand that is shown: type 3 (two palm blocks) of mean proportions, by its length."""
+    """The hand that is shown: of mean proportions, by its length; the layout divides its palm."""
 
-    hand_type: int = 3
     hand_length_m: float = ADULT_HAND_LENGTH_M
 
 
@@ -96,6 +96,8 @@ class Setup(msgspec.Struct, frozen=True):
         subject: The wearer's own hand, and how the glove sits on it; None: ``hand`` and the maker.
         joints: Of a layout that is no hand: where its joints are, as far as that is known.
         mean_rates: Rates are means since the sample before, not of the instant.
+        correction: The thesis's filter of sensor outputs (4.10 to 4.17), before fusion; None: none.
+            It lags, and takes no bias off: to compare.
         smooth: Let a recorded take be fused with its future; nothing live does.
     """
 
@@ -115,6 +117,7 @@ class Setup(msgspec.Struct, frozen=True):
     joints: tuple[JointGeometry, ...] = ()
     mean_rates: bool = False
     smooth: bool = False
+    correction: CorrectionFilter | None = None
 
     @property
     def key(self) -> str:
@@ -159,6 +162,8 @@ def calibrated(
 ) -> Setup:
     """A setup with what is known of wearer and glove; None: nothing, as the maker meant it.
 
+    The palm of a glove's layout is divided as the calibration has it, where its sensors allow that.
+
     Raises:
         CalibrationError: the calibration is of the other hand.
     """
@@ -170,13 +175,35 @@ def calibrated(
             side=subject.side,
             other=setup.layout.side,
         )
+    layout = setup.layout
+    if subject is not None and subject.hand_type != layout.hand_type and divisible(layout):
+        layout = with_hand_type(layout, subject.hand_type)
     return msgspec.structs.replace(
         setup,
+        layout=layout,
         subject=subject,
         sensors=sensors,
         zero=NOMINAL_ZERO if subject is None else "flat hand, functional axes",
         calibration=NO_CALIBRATION if subject is None else subject.id,
     )
+
+
+def divided(setup: Setup, hand_type: HandType) -> Setup:
+    """The setup of a hand whose palm is divided otherwise.
+
+    Raises:
+        CalibrationError: the hand is calibrated, and as another type.
+        LayoutError: the sensors cannot tell a hand of that type.
+    """
+    if setup.subject is not None and setup.subject.hand_type != hand_type:
+        raise CalibrationError(
+            "The calibration {id} is of a hand of type {own}, not {wanted}.",
+            "Calibrate again with --hand-type {wanted}, or process with --calibration none.",
+            id=setup.subject.id,
+            own=setup.subject.hand_type,
+            wanted=hand_type,
+        )
+    return msgspec.structs.replace(setup, layout=with_hand_type(setup.layout, hand_type))
 
 
 def smoothing(setup: Setup) -> Setup:

@@ -7,7 +7,7 @@ import pytest
 
 from handstudio.errors import LayoutError
 from handstudio.hand.skeleton import SEGMENTS
-from handstudio.layout import JointPlace, Layout, SensorPlace, glove
+from handstudio.layout import JointPlace, Layout, SensorPlace, glove, with_hand_type
 
 FOREARM_AND_HAND = ("SN1", "SN11")
 
@@ -127,3 +127,40 @@ def test_two_sensors_of_one_name_are_refused():
 def test_a_side_that_is_none_is_refused_and_not_taken_for_unknown():
     with pytest.raises(LayoutError, match=r"side.*'rigth'.*\n.*left.*right.*unknown"):
         layout({"A": "forearm", "B": "hand"}, side="rigth")
+
+
+# --- hand types -------------------------------------------------------------------------------
+
+
+def test_a_glove_without_a_sensor_on_the_ulnar_block_is_a_hand_of_one_block():
+    few = glove("right", [*FOREARM_AND_HAND, "SN8"])
+    assert glove().hand_type == 3
+    assert few.hand_type == 1
+    assert "ring_mcp" in {joint.name for joint in few.instrumented_joints}
+    with pytest.raises(LayoutError, match="type 2 needs a sensor on hand_ulnar"):
+        glove("right", few.names, 2)
+
+
+@pytest.mark.parametrize("hand_type", [1, 2, 3])
+def test_a_glove_can_be_any_type_and_turned_back(hand_type):
+    typed = glove(hand_type=hand_type)
+    assert typed.hand_type == hand_type
+    assert typed.is_hand
+    assert with_hand_type(glove(), hand_type) == typed
+    assert with_hand_type(typed, 3) == glove()
+    assert msgspec.json.decode(msgspec.json.encode(typed), type=Layout) == typed
+    assert typed.drivers["hand"] == typed.names.index("SN11")
+
+
+def test_a_tree_of_its_own_keeps_its_type():
+    sensors = {"A": "forearm", "B": "hand", "C": "ring_proximal"}
+    own = layout(
+        sensors,
+        ("wrist", "forearm", "hand", 2),
+        ("ring_mcp", "hand", "ring_proximal", 2),
+        side="right",
+    )
+    assert own.is_hand
+    assert own.hand_type == 1
+    with pytest.raises(LayoutError, match="tree of its own: its hand type is 1, not 3"):
+        with_hand_type(own, 3)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from handstudio import setup as setups
+from handstudio.calibration.correction import CorrectionFilter
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import LayoutError, SetupError
@@ -111,6 +112,7 @@ def test_the_key_tells_every_change_and_nothing_else():
         "joints": (JointGeometry("elbow", (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)),),
         "mean_rates": True,
         "smooth": True,
+        "correction": CorrectionFilter(),
     }
     assert other.keys() == set(Setup.__struct_fields__)
     keys = {

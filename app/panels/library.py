@@ -9,6 +9,7 @@ from typing import Any
 import viser
 
 from app import intents
+from app.comparison import OF_TAKE
 from app.panels.base import QUIET, Send, page_of, put, typed
 from app.panels.sheets import ask_deletion, ask_emptying
 from app.review import Review
@@ -42,6 +43,7 @@ class LibraryPanel:
         self._motion = MotionFields(gui, send)
         self._notes = NotesFolder(gui, send)
         self._shelf = ShelfFolder(gui, send, self._selected)
+        self._elsewhere = ElsewhereFolder(gui, send)
         self._opened: Path | None = None
         self._search.on_update(typed(lambda text: send(intents.Search(text))))
         self._choice.on_update(typed(self._chosen))
@@ -63,9 +65,10 @@ class LibraryPanel:
         interrupted = entry is not None and entry.take is None and not entry.recording
         put(self._recover, visible=interrupted and review is None)
         self._export.render(review)
-        self._motion.render(review)
+        self._motion.render(review, state.shelf.found)
         self._notes.render(review)
         self._shelf.render(state)
+        self._elsewhere.render(review)
 
     def export(self, event: Any) -> None:
         """Send the open take's file to the page that asked."""
@@ -171,23 +174,56 @@ class MotionFields:
             visible=False,
         )
         self._words = choices()
+        self._entries: tuple[Entry, ...] | None = None
+        self._of: Path | None = None
         self._compare = gui.add_dropdown(
             _("Compare with"),
             tuple(self._words.values()),
             hint=_("The second hand is pale, its curves dashed; figures are RMS differences"),
             visible=False,
         )
-        names = {words: name for name, words in self._words.items()}
+        self._shift = gui.add_number(
+            _("It begins at [s]"),
+            0.0,
+            step=0.01,
+            hint=_("Of this take: where the other one's begin is laid"),
+            visible=False,
+        )
         self._smooth.on_update(typed(lambda on: send(intents.Smooth(on))))
-        self._compare.on_update(typed(lambda words: send(intents.Compare(names[words]))))
+        self._compare.on_update(typed(lambda words: send(intents.Compare(self._names()[words]))))
 
-    def render(self, review: Review | None) -> None:
+        self._shift.on_update(typed(lambda at_s: send(intents.ShiftComparison(float(at_s)))))
+
+    def _names(self) -> dict[str, str]:
+        return {words: name for name, words in self._words.items()}
+
+    def _offer(self, review: Review, entries: tuple[Entry, ...]) -> None:
+        """Motions of the same take, then other takes."""
+        if entries is self._entries and review.take.path == self._of:
+            return
+        self._entries, self._of = entries, review.take.path
+        others = {
+            f"{OF_TAKE}{entry.path}": _label(entry)
+            for entry in entries
+            if entry.take is not None and entry.path != review.take.path
+        }
+        self._words = {**choices(), **others}
+        if self._compare.options != tuple(self._words.values()):
+            self._compare.options = tuple(self._words.values())
+
+    def render(self, review: Review | None, entries: tuple[Entry, ...]) -> None:
         """Show what was asked for."""
+        if review is not None:
+            self._offer(review, entries)
+        second = review.comparison if review is not None else None
+        put(self._shift, visible=second is not None and bool(second.take))
+        if second is not None:
+            put(self._shift, value=second.later_s)
         for handle in (self._smooth, self._compare):
             put(handle, visible=review is not None)
         if review is not None:
             put(self._smooth, value=review.smooth)
-            put(self._compare, value=self._words[review.compare])
+            put(self._compare, value=self._words.get(review.compare, self._words[""]))
 
 
 class NotesFolder:
@@ -202,6 +238,11 @@ class NotesFolder:
                 _("Name of the part"), "", hint=_("What happens between begin and end")
             )
             self._name = gui.add_button(_("Name this part"), color=QUIET)
+            self._trim = gui.add_button(
+                _("Trim to this part"),
+                color=QUIET,
+                hint=_("A new take of the part from begin to end; this one stays as it is"),
+            )
             self._mark = gui.add_dropdown(_("Mark"), ("",), visible=False)
             self._remove = gui.add_button(_("Remove this mark"), color=QUIET, visible=False)
         self._marks: dict[str, float] = {}
@@ -209,6 +250,7 @@ class NotesFolder:
         self._of: Path | None = None
         self._text.on_update(typed(lambda text: send(intents.SetNotes(text))))
         self._name.on_click(lambda _event: send(intents.NamePart(self._label.value)))
+        self._trim.on_click(lambda _event: send(intents.TrimTake(self._label.value)))
         self._mark.on_update(typed(lambda text: send(intents.Seek(self._marks.get(text, 0.0)))))
         self._remove.on_click(
             lambda _event: send(intents.RemoveMark(self._marks.get(self._mark.value, -1.0)))
@@ -219,6 +261,8 @@ class NotesFolder:
         put(self._folder, visible=review is not None)
         if review is None:
             return
+        whole = review.in_s <= 0.0 and review.out_s is None
+        put(self._trim, disabled=whole or review.partial)
         notes = review.notes
         # written only where they changed by themselves: else words just typed would be overwritten
         if (review.take.path, notes.text) != (self._of, self._written):
@@ -238,6 +282,40 @@ class NotesFolder:
             self._mark.options = options
         put(self._mark, visible=bool(self._marks))
         put(self._remove, visible=bool(self._marks))
+
+
+class ElsewhereFolder:
+    """Takes that come from another computer, or go there."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        with gui.add_folder(_("From elsewhere"), expand_by_default=False):
+            upload = gui.add_upload_button(
+                _("Add a take"),
+                icon=viser.Icon.UPLOAD,
+                color=QUIET,
+                hint=_("A file .mcap or .take.zip of your computer is copied into the library"),
+            )
+            path = gui.add_text(
+                _("or path"), "", hint=_("Of the studio's computer: a take, or a folder to import")
+            )
+            self._open = gui.add_button(_("Add from the path"), color=QUIET)
+            self._share = gui.add_button(
+                _("Share as one file"),
+                icon=viser.Icon.SHARE,
+                color=QUIET,
+                hint=_("The take with its notes, to be added elsewhere"),
+            )
+        upload.on_upload(
+            lambda event: send(intents.AddTake(event.target.value.name, event.target.value.content))
+        )
+        self._open.on_click(
+            lambda _event: send(intents.AddTake(path.value)) if path.value else None
+        )
+        self._share.on_click(lambda event: send(intents.ShareTake(page_of(event))))
+
+    def render(self, review: Review | None) -> None:
+        """Only an open take can be shared."""
+        put(self._share, disabled=review is None)
 
 
 class ShelfFolder:

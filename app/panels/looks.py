@@ -33,6 +33,7 @@ class LooksPanel:
             self._shown = {
                 part: gui.add_checkbox(label, getattr(shown, part), hint=hint)
                 for part, label, hint in (
+                    ("skin", _("Skin"), _("Key: G; the bones are seen through it")),
                     ("bones", _("Bones"), _("Key: B")),
                     ("sensors", _("Sensors"), _("Key: S; shake one and it lights up")),
                     ("axes", _("Sensor axes"), _("Key: X; red x, green y, blue z")),
@@ -49,7 +50,7 @@ class LooksPanel:
                 color=QUIET,
                 hint=_("A file for whoever helps; nothing of the people recorded is in it"),
             )
-        self._panel.float(x=-16.0, y=16.0, width=236.0, height=250.0)
+        self._panel.float(x=-16.0, y=16.0, width=236.0, height=282.0)
         self._panel.minimize()
         self._words = {view: label for label, view in words.items()}
         self._views.on_update(typed(lambda label: send(intents.SetView(words[label]))))

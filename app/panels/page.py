@@ -102,7 +102,7 @@ class Page:
         for number, client in clients.items():
             if number not in self._plots:
                 narrow = client.camera.image_width < _NARROW_PX
-                self._plots[number] = PlotsPanel(client.gui, narrow)
+                self._plots[number] = PlotsPanel(client.gui, self._send, narrow)
                 self._plots[number].render_health(health_view.as_html(state))
             self._plots[number].render(curves, dark=state.settings.theme == "dark")
         if self._tick % HEALTH_EVERY == 0:
@@ -166,6 +166,11 @@ def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
         (_("The part begins here"), "I", intents.MarkIn()),
         (_("The part ends here"), "O", intents.MarkOut()),
         (_("The whole take again"), "W", intents.WholeTake()),
+        (_("Less time in the plots"), "pageup", intents.ZoomPlots(2.0)),
+        (_("More time in the plots"), "pagedown", intents.ZoomPlots(0.5)),
+        (_("Plots on in time"), "end", intents.PanPlots(0.5)),
+        (_("Plots back in time"), "home", intents.PanPlots(-0.5)),
+        (_("The part fills the plots, or the whole take"), "P", intents.FitPlots()),
         (_("Back to the live hand"), "L", intents.ShowLive()),
         (_("Turn the forearm away from me"), "F", intents.FaceForward()),
         (_("Seen from the desk"), "1", intents.SetView(View.DESK)),
@@ -173,6 +178,7 @@ def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
         (_("Seen from the back"), "3", intents.SetView(View.BACK)),
         (_("Seen from the thumb"), "4", intents.SetView(View.THUMB)),
         (_("Follow the hand"), "5", intents.SetView(View.FOLLOW)),
+        (_("Show or hide the skin"), "G", intents.ToggleShown("skin")),
         (_("Show or hide bones"), "B", intents.ToggleShown("bones")),
         (_("Show or hide sensors"), "S", intents.ToggleShown("sensors")),
         (_("Show or hide sensor axes"), "X", intents.ToggleShown("axes")),

@@ -38,6 +38,11 @@ class TransportPanel:
                 (_("Begin here"), _("End here"), _("Whole")),
                 hint=_("The part that is played and exported; keys: I, O, W"),
             )
+            self._zoom = gui.add_button_group(
+                _("Plots"),
+                ("−", "+", "◀", "▶", _("Part or all")),
+                hint=_("More or less time, back and on; keys: page up and down, home, end, P"),
+            )
             self._marks = gui.add_button_group(
                 _("Marks"),
                 (_("Before"), _("Mark here"), _("Next")),
@@ -47,7 +52,7 @@ class TransportPanel:
             self._live = gui.add_button(
                 _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
-        self._panel.float(x=16.0, y=-16.0, width=440.0, height=330.0)
+        self._panel.float(x=16.0, y=-16.0, width=440.0, height=368.0)
         self._playing = False
         self._written = 0.0
         self._time.on_update(typed(lambda at_s: send(intents.Seek(at_s))))
@@ -56,6 +61,15 @@ class TransportPanel:
         self._speed.on_update(typed(lambda text: send(intents.SetSpeed(float(text.rstrip("x"))))))
         self._loop.on_update(typed(lambda on: send(intents.SetLoop(on))))
         _on_choice(self._window, send, (intents.MarkIn(), intents.MarkOut(), intents.WholeTake()))
+        _on_choice(
+            self._zoom,
+            send,
+            (
+                *(intents.ZoomPlots(factor) for factor in (0.5, 2.0)),
+                *(intents.PanPlots(share) for share in (-0.5, 0.5)),
+                intents.FitPlots(),
+            ),
+        )
         _on_choice(
             self._marks,
             send,

@@ -29,12 +29,14 @@ def compared_ghost(state: State) -> GhostView | None:
         return None
     second, fit = review.comparison, review.comparison.fit
     pose = pose_of(second.setup, second.at(float(review.time_s[review.index])).q_world_sensor, fit)
-    return GhostView(fit.skeleton, _turned(pose, state.yaw or 0.0), _NONE, "", beside=False)
+    words = _("pale: {name}").format(name=choices()[second.name])
+    return GhostView(fit.skeleton, _turned(pose, state.yaw or 0.0), _NONE, words, beside=False)
 
 
 def comparison_words(comparison: Comparison) -> str:
     """What is pale in the picture and dashed in the plots."""
-    return _("pale and dashed: {name}").format(name=choices()[comparison.name])
+    name = comparison.take or choices()[comparison.name]
+    return _("pale and dashed: {name}").format(name=name)
 
 
 def _turned(pose: Pose, yaw: float) -> Pose:

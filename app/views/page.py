@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from app.channels import Plot, plots_of
+from app.channels import OF_TAKES, SIGNALS, Plot, plots_of, sets_of
 from app.live import SPAN_S
-from app.look import Camera, View, camera_for, course_camera
+from app.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lowered
 from app.state import State
 from app.views.comparison import comparison_words
 from app.views.health import worst_of
@@ -62,12 +62,18 @@ class Curves:
     """Plots with their data; ``now_s`` is where the playhead stands.
 
     Attributes:
+        sets: What can be plotted, by name, in words.
+        chosen: Name of what is.
+        sensors: Those of which signals can be; none live.
+        sensor: The one whose signals are.
         sds: Standard deviations of the values, inf where the filter does not tell.
         second: The same curves of the motion that is compared with.
-        rms_deg: And by how much each differs.
+        rms: And by how much each differs.
     """
 
     plots: tuple[Plot, ...]
+    sets: dict[str, str]
+    chosen: str
     time_s: Float[Array, " n"]
     values: Float[Array, "n c"]
     from_s: float
@@ -75,7 +81,9 @@ class Curves:
     now_s: float | None
     sds: Float[Array, "n c"] | None = None
     second: Float[Array, "n c"] | None = None
-    rms_deg: Float[Array, " c"] | None = None
+    rms: Float[Array, " c"] | None = None
+    sensors: tuple[str, ...] = ()
+    sensor: str = ""
 
 
 def status_of(state: State) -> Status:
@@ -153,29 +161,36 @@ def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
     if state.guided is not None and state.view is View.DESK:
         return course_camera(state.guided.course.layout.side, near=looks_near(state))
     if isinstance(view, HandView):
-        return camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
-    return camera_for(state.view, None, None, 0.0)
+        camera = camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
+    else:
+        camera = camera_for(state.view, None, None, 0.0)
+    return camera if state.review is None else lowered(camera, ABOVE_SHEET)
 
 
 def curves_of(state: State) -> Curves | None:
     """What the plots show now."""
     review, live = state.review, state.live
     if review is not None:
-        plots = plots_of(review.setup.layout)
-        end = max(review.duration_s, 0.1)
-        time_s, values, sds = review.plot_time_s, review.plot_values, review.plot_sds
-        curves = Curves(plots, time_s, values, 0.0, end, review.at_s, _told(sds))
-        second = review.comparison
-        if second is not None:
-            return replace(curves, second=second.values, rms_deg=second.rms_deg)
-        return curves
+        layout, seen = review.setup.layout, review.seen
+        choice = review.choice
+        plots = plots_of(layout, choice.name, layout.names[choice.sensor])
+        window = review.from_s, max(review.to_s, review.from_s + 0.1)
+        sds = None if seen.sds is None else _told(seen.sds)
+        which = plots, sets_of(layout), choice.name
+        curves = Curves(*which, seen.time_s, seen.values, *window, review.at_s, sds)
+        curves = replace(curves, second=seen.second, rms=seen.rms)
+        if choice.name != SIGNALS:
+            return curves
+        return replace(curves, sensors=layout.names, sensor=layout.names[choice.sensor])
     if live is None or len(live.time_s) == 0:
         return None
     newest = float(live.time_s[-1])
     start = max(0.0, newest - SPAN_S)
-    plots = plots_of(live.setup.layout)
+    layout = live.setup.layout
+    sets = {name: words for name, words in sets_of(layout).items() if name not in OF_TAKES}
+    which = plots_of(layout, live.chosen), sets, live.chosen
     end = max(newest, SPAN_S)
-    return Curves(plots, live.time_s, live.values, start, end, now_s=None, sds=_told(live.sds))
+    return Curves(*which, live.time_s, live.values, start, end, now_s=None, sds=_told(live.sds))
 
 
 def _told(sds: Float[Array, "n c"]) -> Float[Array, "n c"] | None:
@@ -192,7 +207,8 @@ def caption_of(state: State) -> str:
         )
         smooth = _("smoothed") if review.setup.smooth else ""
         second = comparison_words(review.comparison) if review.comparison is not None else ""
-        return " · ".join(filter(None, [what, smooth, second, _missing(review.setup)]))
+        part = _("the first seconds; the rest is being computed") if review.partial else ""
+        return " · ".join(filter(None, [what, part, smooth, second, _missing(review.setup)]))
     newest = state.newest
     if newest.setup is None or newest.motion is None:
         return _("No hand yet")

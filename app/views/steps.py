@@ -65,7 +65,7 @@ def joint_name(joint: str) -> str:
         "ring": _("Ring"),
         "little": _("Little"),
     }
-    if joint == "hand_ulnar":
+    if joint in ("hand_ulnar", "wrist_ulnar"):
         return parts["ulnar"]
     joints = {
         "mcp": _("MCP"),

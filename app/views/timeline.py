@@ -1,57 +1,115 @@
-"""A take as a strip: its length, the part that counts, marks, named stretches, doubts. Pure."""
+"""A take as a strip: its length, the part that counts, what was noted and found. Pure."""
 
 from __future__ import annotations
 
 import html
-
-import numpy as np
+from collections.abc import Iterator
 
 from app.review import Review
 from app.words import _
-from handstudio.pipeline import Motion
+from handstudio.analysis.stretches import Stretch, StretchKind
 
 _WIDTH = 1000.0  # of the drawing; the page stretches it
-_DOUBTS = 200  # stretches that are told apart at most
+
+# lanes from above: notes, the take itself, what is missing or doubted, what can hardly be
+_NOTED, _TAKE, _DATA, _HARDLY = (4, 7), (14, 8), (25, 5), (32, 5)
+_HEIGHT = 40
+
+_COLOURS: dict[StretchKind, str] = {
+    "gap": "#e5484d",
+    "silent": "#e5484d",
+    "unplaced": "#8a909a",
+    "saturated": "#f5a524",
+    "impossible": "#c061cb",
+    "drift": "#6e56cf",
+}
 
 
 def as_svg(review: Review) -> str:
-    """The strip with the playhead, as the page shows it."""
+    """The strip with the playhead, and which colour is what, as the page shows it."""
+    parts = "".join(_parts(review))
+    return (
+        f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT}" '
+        f'height="{_HEIGHT}" width="100%" preserveAspectRatio="none">{parts}</svg>'
+        f"{_legend(review)}</div>"
+    )
+
+
+def words_of(stretch: Stretch) -> str:
+    """What is the matter with a stretch."""
+    who = ", ".join(stretch.names[:3]) + (" …" if len(stretch.names) > 3 else "")
+    how = _figures()[stretch.kind].format(worst=stretch.worst)
+    told = " ".join(filter(None, [_kinds()[stretch.kind], who, how]))
+    return f"{told} · {stretch.start_s:.2f}-{stretch.end_s:.2f} s"
+
+
+def _parts(review: Review) -> Iterator[str]:
     end = max(review.duration_s, 1e-6)
 
     def at(seconds: float) -> float:
         return round(_WIDTH * min(max(seconds / end, 0.0), 1.0), 1)
 
-    parts = [_bar((0.0, _WIDTH), (12, 8), "currentColor", 0.15)]
+    def wide(begin_s: float, end_s: float) -> tuple[float, float]:
+        """Wide enough to be seen and met by a pointer."""
+        return at(begin_s), max(at(end_s), at(begin_s) + 2.5)
+
+    yield _bar((0.0, _WIDTH), _TAKE, "currentColor", 0.15)
+    if review.from_s > 0.0 or review.to_s < review.duration_s:
+        lens = at(review.from_s), at(review.to_s)
+        yield _bar(lens, (0, _HEIGHT), "currentColor", 0.08, _("in the plots"))
     if review.in_s > 0.0 or review.out_s is not None:
-        parts.append(_bar((at(review.in_s), at(review.end_s)), (12, 8), "#3b82f6", 0.6))
-    for begin, stop in doubts_of(review.motion):
-        parts.append(_bar((at(begin), max(at(stop), at(begin) + 2.0)), (20, 4), "#f5a524", 0.9))
+        yield _bar((at(review.in_s), at(review.end_s)), _TAKE, "#3b82f6", 0.6)
+    for stretch in review.stretches or ():
+        lane = _HARDLY if stretch.kind in ("impossible", "drift") else _DATA
+        span = wide(stretch.start_s, stretch.end_s)
+        yield _bar(span, lane, _COLOURS[stretch.kind], 0.9, words_of(stretch))
     for label in review.notes.labels:
         title = f"{label.label} {label.start_s:.2f}-{label.end_s:.2f} s"
-        parts.append(_bar((at(label.start_s), at(label.end_s)), (5, 5), "#12b886", 0.8, title))
+        yield _bar(wide(label.start_s, label.end_s), _NOTED, "#12b886", 0.8, title)
     unnamed = _("mark")
     for mark in review.notes.marks:
         title = f"{mark.text or unnamed} {mark.at_s:.2f} s"
-        parts.append(_bar(_around(at(mark.at_s), 1.5), (4, 20), "#fcd34d", 1.0, title))
-    parts.append(_bar(_around(at(review.at_s), 1.0), (2, 24), "currentColor", 1.0))
-    return (
-        f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} 28" height="28" '
-        f'width="100%" preserveAspectRatio="none">{"".join(parts)}</svg></div>'
+        yield _bar(_around(at(mark.at_s), 1.5), (2, 22), "#fcd34d", 1.0, title)
+    yield _bar(_around(at(review.at_s), 1.0), (0, _HEIGHT), "currentColor", 1.0)
+
+
+def _legend(review: Review) -> str:
+    """The kinds that occur; else that there are none."""
+    style = "font-size:.72rem;line-height:1.3;opacity:.8"
+    if review.stretches is None:
+        return f'<div style="{style}">{html.escape(_("looking through the take ..."))}</div>'
+    found: dict[StretchKind, int] = {}
+    for stretch in review.stretches:
+        found[stretch.kind] = found.get(stretch.kind, 0) + 1
+    words = _kinds()
+    told = " ".join(
+        f'<span style="white-space:nowrap"><span style="color:{_COLOURS[kind]}">&#9632;</span> '
+        f"{html.escape(words[kind])} {count}</span>"
+        for kind, count in sorted(found.items(), key=lambda one: list(_COLOURS).index(one[0]))
     )
+    return f'<div style="{style}">{told or html.escape(_("nothing to look at twice"))}</div>'
 
 
-def doubts_of(motion: Motion) -> tuple[tuple[float, float], ...]:
-    """Stretches in which any sensor is in doubt [s], at most so many; the rest are joined."""
-    if len(motion) == 0:
-        return ()
-    time_s = (motion.time_us - motion.time_us[0]) * 1e-6
-    doubtful = np.concatenate([[False], (motion.doubt != 0).any(axis=1), [False]])
-    begins = np.flatnonzero(~doubtful[:-1] & doubtful[1:])
-    ends = np.flatnonzero(doubtful[:-1] & ~doubtful[1:]) - 1
-    if len(begins) > _DOUBTS:
-        chosen = np.linspace(0, len(begins) - 1, _DOUBTS).astype(int)
-        begins, ends = begins[chosen], ends[np.append(chosen[1:] - 1, len(ends) - 1)]
-    return tuple((float(time_s[b]), float(time_s[e])) for b, e in zip(begins, ends, strict=True))
+def _kinds() -> dict[StretchKind, str]:
+    return {
+        "gap": _("gap"),
+        "silent": _("silent sensor"),
+        "unplaced": _("not yet at rest"),
+        "saturated": _("saturated"),
+        "impossible": _("hardly possible"),
+        "drift": _("turns at rest"),
+    }
+
+
+def _figures() -> dict[StretchKind, str]:
+    return {
+        "gap": _("{worst:.0f} instants missing"),
+        "silent": "",
+        "unplaced": "",
+        "saturated": "",
+        "impossible": _("{worst:.0f}° beyond"),
+        "drift": _("{worst:.0f}° a minute"),
+    }
 
 
 def _around(middle: float, half: float) -> tuple[float, float]:

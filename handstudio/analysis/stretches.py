@@ -133,7 +133,8 @@ def _impossible(
         progress(0.2 + 0.7 * min(1.0, (begin + block) / len(thin)))
     beyond[(thin.doubt & np.uint8(Doubt.UNPLACED)).any(axis=1)] = 0.0  # nobody believes these
     found: list[Stretch] = []
-    for begin, end in _runs((beyond > 0.0).any(axis=1)):
+    outside: Array = (beyond > 0.0).max(axis=1)
+    for begin, end in _runs(outside):
         if time_s[end] - time_s[begin] < _LASTS_S:
             continue
         worst = beyond[begin : end + 1].max(axis=0)
@@ -156,7 +157,7 @@ def _drifts(setup: Setup, thin: Motion, time_s: Float[Array, " m"]) -> list[Stre
     q = thin.q_world_sensor
     steps = np.linalg.norm(so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:])), axis=-1)
     deg_s = np.rad2deg(steps) / np.diff(time_s)[:, None]
-    still = np.asarray((deg_s < _REST_DEG_S).all(axis=1))
+    still: Array = (deg_s < _REST_DEG_S).all(axis=1)
     found: list[Stretch] = []
     for begin, end in _runs(still):
         seconds = float(time_s[end + 1] - time_s[begin])

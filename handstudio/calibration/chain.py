@@ -29,7 +29,6 @@ from handstudio.calibration.chain_tree import (
     Priors,
     Tree,
     index_of,
-    number_of,
     parent_of,
     prior_of,
 )
@@ -60,6 +59,8 @@ class Chain:
 
     def link(self, joint: str) -> tuple[Array, Array]:
         """From the centre before to this joint's, in the parent's sensor; and covariance."""
+        if joint == _HINGE and ("link", 0, joint) not in self.index:
+            return np.zeros(3), np.zeros((3, 3))  # both blocks of the palm begin at the wrist
         return self._vector(("link", 0, joint))
 
     def sensor(self, sensor: int) -> tuple[Array, Array]:
@@ -128,9 +129,8 @@ def _between_axes(tree: Tree, index: dict[Key, int], x: Array) -> Array:
     for kind, _, name in list(index):
         if kind != "pass":
             continue
-        axis, joint = tree.axes[name], JOINTS[number_of(name)]
-        driver, parent = tree.driver.get(joint.child), tree.driver[parent_of(name)]
-        if axis.across is None or axis.sideways is None or driver is None:
+        axis, parent = tree.axes[name], tree.driver[parent_of(name)]
+        if axis.across is None or axis.sideways is None:
             continue
         at = index["pass", 0, name]
         wander = so3.rotate(tree.swings.q_flat(parent), x[at : at + 3])
@@ -139,13 +139,15 @@ def _between_axes(tree: Tree, index: dict[Key, int], x: Array) -> Array:
         swung = _spread(axis.sideways[0], swings.of_joint(name, flexion=False))
         shift = -np.cross(wander, axis.across) * swung / (flexed + swung)
         _add(x, index, ("link", 0, name), so3.rotate(so3.conjugate(swings.q_flat(parent)), shift))
+        beginning = tree.begin_at(name)
         for sensor, segment in tree.segment.items():
-            if segment == joint.child:
+            if segment in beginning:
                 seen = so3.rotate(so3.conjugate(swings.q_flat(sensor)), shift)
                 _add(x, index, ("sensor", sensor, ""), -seen)
-        seen = so3.rotate(so3.conjugate(swings.q_flat(driver)), shift)
         for other in JOINTS:
-            if other.parent == joint.child:
+            driver = tree.driver.get(other.parent or "")
+            if other.parent in beginning and driver is not None:
+                seen = so3.rotate(so3.conjugate(swings.q_flat(driver)), shift)
                 _add(x, index, ("link", 0, other.name), -seen)
     return x
 
@@ -205,5 +207,6 @@ def _residuals(blocks: list[Block], x: Array, priors: Priors) -> dict[str, float
     return {joint: float(np.sqrt(np.mean(squares))) for joint, squares in sums.items()}
 
 
+_HINGE = "ulnar_cmc"
 _ROUNDS = 3
 _STEP = 1e-3  # rad per m/s²

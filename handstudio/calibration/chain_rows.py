@@ -72,7 +72,8 @@ def blocks_of(tree: Tree, swing: Swing, index: dict[Key, int]) -> list[Block]:
         for joint in tree.chain(tree.segment[sensor])[1:]:
             assert joint.parent is not None
             base = felt[tree.driver[joint.parent]]
-            columns["link", 0, joint.name] = base.of_point
+            if ("link", 0, joint.name) in index:  # else it has no length
+                columns["link", 0, joint.name] = base.of_point
             above = tree.joint_of[joint.parent].name
             if ("lean", 0, joint.name) in index and above == swing.joint:
                 columns["lean", 0, joint.name] = base.of_wander(tree.axes[above].angle, part)

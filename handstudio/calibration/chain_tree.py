@@ -12,7 +12,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis
 from handstudio.calibration.mounting import nominal_places
 from handstudio.calibration.swings import Swings
-from handstudio.hand.skeleton import JOINTS, SEGMENTS, Joint, Skeleton
+from handstudio.hand.skeleton import JOINTS, SEGMENTS, ULNAR, Joint, Skeleton
 
 Key: TypeAlias = tuple[str, int, str]
 """An unknown vector: ("link", 0, joint), ("sensor", sensor, ""), ("skin", sensor, joint),
@@ -81,10 +81,9 @@ class Tree:
     def __init__(self, swings: Swings, axes: Mapping[str, JointAxis]) -> None:
         self.swings, self.axes = swings, axes
         self.segment = {s: swings.layout.sensors[s].segment for s in swings.alive}
-        self.driver: dict[str, int] = {}
-        for sensor in swings.alive:
-            self.driver.setdefault(self.segment[sensor], sensor)
+        self.driver = swings.first
         self.joint_of = {joint.child: joint for joint in JOINTS}
+        self.hinged = swings.layout.hand_type == 3
 
     def chain(self, segment: str) -> list[Joint]:
         """Joints from the elbow out to a segment."""
@@ -104,6 +103,11 @@ class Tree:
             and all(j.parent is None or j.parent in self.driver for j in self.chain(segment))
         ]
 
+    def begin_at(self, joint: str) -> tuple[str, ...]:
+        """Segments that begin at a joint's centre: at the wrist both blocks of an unhinged palm."""
+        child = JOINTS[number_of(joint)].child
+        return (child, ULNAR) if child == "hand" and not self.hinged else (child,)
+
     def beside(self, sensor: int) -> list[str]:
         """Joints whose skin a sensor lies on."""
         segment = self.segment[sensor]
@@ -112,7 +116,8 @@ class Tree:
 
 def index_of(tree: Tree) -> dict[Key, int]:
     """Where each unknown vector begins."""
-    keys: list[Key] = [("link", 0, j.name) for j in JOINTS if j.parent in tree.driver]
+    links = [j for j in JOINTS if j.child != ULNAR or tree.hinged]
+    keys: list[Key] = [("link", 0, j.name) for j in links if j.parent in tree.driver]
     keys += [("sensor", s, "") for s in tree.segment]
     keys += [("skin", s, j) for s in tree.segment for j in tree.beside(s)]
     moving = [j.name for j in JOINTS if j.parent in tree.driver and j.name in tree.axes]

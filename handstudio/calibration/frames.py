@@ -18,7 +18,7 @@ from handstudio.calibration.axes import JointAxis
 from handstudio.calibration.chain import Chain
 from handstudio.calibration.lying import bones
 from handstudio.calibration.swings import Swings
-from handstudio.hand.skeleton import DISTALS, FINGERS, JOINTS, PARENTS, SEGMENTS, Skeleton
+from handstudio.hand.skeleton import DISTALS, FINGERS, JOINTS, PARENTS, SEGMENTS, ULNAR, Skeleton
 from handstudio.maths import so3
 
 
@@ -60,10 +60,12 @@ def framed(
     q_sensor_segment = np.tile(so3.IDENTITY, (len(JOINTS), 1))
     lying = bones(swings, axes, chain)
     for k, sensor in enumerate(drivers):
-        if sensor is not None:
+        if sensor is not None and not _is_hands(swings, k):
             bone = lying.get(SEGMENTS[k])
             far = _far_end(swings, chain, k, sensor) if bone is None else bone
             q_sensor_segment[k] = _frame(swings, axes, k, sensor, far)
+        elif sensor is not None:
+            q_sensor_segment[k] = q_sensor_segment[PARENTS[k]]
     rest = skeleton.q_parent_rest.copy()
     joint, covariance = skeleton.t_parent_joint.copy(), np.zeros((len(JOINTS), 3, 3))
     for k, parent in enumerate(PARENTS):
@@ -81,14 +83,26 @@ def framed(
             mine = so3.multiply(swings.q_flat(here), q_sensor_segment[k])
             rest[k] = so3.multiply(so3.conjugate(base), mine)
     tips, measured = _tips(swings, chain, skeleton, joint, q_sensor_segment)
+    drivers = tuple(None if _is_hands(swings, k) else s for k, s in enumerate(drivers))
     return Frames(drivers, q_sensor_segment, rest, joint, covariance, tips, measured)
 
 
 _TIP_BOARD_M = 0.009  # height of the board of the sensor on the fingertip above the bone
 
 
+def turning(swings: Swings, k: int) -> str:
+    """The joint whose flexion a segment's x lies along: its own, or the wrist."""
+    unhinged = SEGMENTS[k] == ULNAR and swings.layout.hand_type != 3
+    return JOINTS[PARENTS[k] if unhinged else k].name
+
+
+def _is_hands(swings: Swings, k: int) -> bool:
+    """Whether a segment is one with the hand."""
+    return SEGMENTS[k] == ULNAR and swings.layout.hand_type == 1
+
+
 def _frame(swings: Swings, axes: Mapping[str, JointAxis], k: int, sensor: int, far: Array) -> Array:
-    axis = axes.get(JOINTS[k].name)
+    axis = axes.get(turning(swings, k))
     x = np.array([1.0, 0.0, 0.0]) if axis is None else axis.seen_from(swings, sensor)
     z = np.cross(x, far)
     z = z / np.linalg.norm(z)

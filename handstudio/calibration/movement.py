@@ -45,10 +45,8 @@ def moved_since(rest: ImuSamples | None, done: ImuSamples, layout: Layout) -> Mo
     """Follow the sensors by their gyroscopes, from their attitudes at rest."""
     calm = done[: max(1, len(done) // 20)] if rest is None or not len(rest) else rest
     heard = np.minimum(heard_pct(done), heard_pct(calm))
-    stand: dict[str, int] = {}
-    for index, place in enumerate(layout.sensors):
-        if heard[index] >= demands.ANSWERING_PCT:
-            stand.setdefault(place.segment, index)
+    answering = np.flatnonzero(heard >= demands.ANSWERING_PCT)
+    stand = layout.drivers_among([int(index) for index in answering])
     used = list(stand.values())
     time_s, span_s, rate = _rates(done, used)
     rate = rate - _biases(rest, done)[used]

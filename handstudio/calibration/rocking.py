@@ -97,9 +97,9 @@ def _slope(swings: Swings, axis: JointAxis, still: Joint) -> float | None:
     """Turn of a joint that should be still, about another's axis, per turn of that one."""
     turn = relative_turn(swings, still.name)
     trials = swings.of_joint(axis.joint, flexion=True)
-    if turn is None or not trials:
+    parent, child = swings.drivers(still.name)
+    if turn is None or not trials or parent == child:
         return None
-    parent, _ = swings.drivers(still.name)
     n = axis.in_world if parent is None else axis.seen_from(swings, parent)
     if parent is None:  # the world is no sensor: the axis as it lies in this swing
         return None

@@ -11,7 +11,7 @@ from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis, flexion_axis
 from handstudio.calibration.chain import Chain, solved
 from handstudio.calibration.chain_tree import USUAL, Priors
-from handstudio.calibration.frames import Frames, framed
+from handstudio.calibration.frames import Frames, framed, turning
 from handstudio.calibration.rocking import Rocking, leaning, rocking, steadied
 from handstudio.calibration.subject import (
     Axis,
@@ -106,7 +106,7 @@ def found(swings: Swings, side: HandSide, hand_length_m: float, priors: Priors =
     rocks = rocking(swings, raw)
     steady = steadied(swings, raw, rocks)
     axes = _axes(steady)
-    skeleton = nominal_skeleton(side, hand_length_m)
+    skeleton = nominal_skeleton(side, hand_length_m, swings.layout.hand_type)
     chain = solved(steady, axes, skeleton, priors)
     rocks = leaning(steady, axes, chain) | rocks
     return Found(steady, axes, rocks, chain, framed(steady, axes, chain, skeleton), skeleton)
@@ -132,7 +132,7 @@ def _segment(found: Found, k: int) -> Segment:
         sd_m=_vector(np.sqrt(np.diag(spread))),
         length_m=far,
         length_sd_m=far_sd,
-        source=_source(found, JOINTS[k].name),
+        source=_source(found, turning(found.swings, k)),
         length_source=far_source,
         plausible=(far - usual) / float(np.hypot(POPULATION_SHARE * usual, far_sd)),
     )

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.calibration.attitudes import attitudes_between_rests, unbiased
-from handstudio.hand.skeleton import JOINTS
+from handstudio.hand.skeleton import JOINTS, ULNAR
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY
@@ -68,12 +68,17 @@ class Swings:
 
     def drivers(self, joint: str) -> tuple[int | None, int | None]:
         """Sensors on parent and child of a joint; None: no sensor there answers."""
-        segments = {j.name: (j.parent, j.child) for j in JOINTS}[joint]
-        first: dict[str, int] = {}
-        for sensor in self.alive:
-            first.setdefault(self.layout.sensors[sensor].segment, sensor)
-        parent, child = segments
+        parent, child = {j.name: (j.parent, j.child) for j in JOINTS}[joint]
+        first = self.first
         return None if parent is None else first.get(parent), first.get(child)
+
+    @property
+    def first(self) -> dict[str, int]:
+        """The sensor that defines each segment, of those that answer; a rigid palm has but one."""
+        first = self.layout.drivers_among(self.alive)
+        if self.layout.hand_type == 1 and "hand" in first:
+            first[ULNAR] = first["hand"]
+        return first
 
     def q_flat(self, sensor: int) -> Float[Array, " 4"]:
         """Attitude of a sensor in the middle of the flat hand."""
@@ -108,6 +113,7 @@ def prepared(
     time_s = np.arange(len(gyr)) / rate_hz
     q = attitudes_between_rests(time_s, free, acc, rests, heading)
     flats = [_inner(a, b, rate_hz, len(gyr)) for a, b, name in labels if name == "flat_hand"]
+    swung = [x for x in labels if ":" in x[2] and is_there(layout, x[2])]
     return Swings(
         layout=layout,
         rate_hz=rate_hz,
@@ -115,10 +121,15 @@ def prepared(
         gyr=smooth(free, rate_hz),
         dgyr=smooth(free, rate_hz, 1),
         acc=smooth(acc, rate_hz),
-        swings=tuple(_swing(a, b, name, rate_hz, len(gyr)) for a, b, name in labels if ":" in name),
+        swings=tuple(_swing(a, b, name, rate_hz, len(gyr)) for a, b, name in swung),
         flat=flats[-1] if flats else rests[0],
         alive=tuple(alive),
     )
+
+
+def is_there(layout: Layout, label: str) -> bool:
+    """Whether what a label names can be done: a palm that is not hinged has no joint to fold at."""
+    return layout.hand_type == 3 or label.partition(":")[0] != "ulnar_cmc"
 
 
 def joined(parts: Sequence[Swings]) -> Swings:

@@ -21,7 +21,7 @@ from handstudio.calibration.subject import SubjectCalibration, decode
 from handstudio.commands.arguments import Json, Sessions
 from handstudio.commands.readings import show_verdicts, told
 from handstudio.errors import CalibrationError
-from handstudio.hand.skeleton import HandSide
+from handstudio.hand.skeleton import HandSide, HandType
 from handstudio.recording.calibrations import (
     SubjectVersion,
     history,
@@ -56,6 +56,7 @@ def calibrate(
     takes: Takes = (),
     *,
     subject: str = "",
+    hand_type: HandType | None = None,
     dry_run: bool = False,
     anyway: bool = False,
     sessions: Sessions = None,
@@ -66,6 +67,8 @@ def calibrate(
     Args:
         takes: The takes; their labels say what was done when.
         subject: Keep it for this subject; for that of the takes unless given.
+        hand_type: How the palm is divided: 1, one block; 2, two from the wrist; 3, one hinged to
+            the other. As the takes have it unless given: 3, and 1 without a sensor on the edge.
         dry_run: Keep nothing.
         anyway: Keep it also where steps were done badly and nothing better is there.
         sessions: Folder of the takes.
@@ -73,7 +76,7 @@ def calibrate(
     """
     opened = _opened(takes, "calibrate")
     with progress("calibrating", quiet=json) as share:
-        found = calibrate_takes(opened, share)
+        found = calibrate_takes(opened, share, hand_type)
     calibration = found.calibration
     if subject:
         calibration = msgspec.structs.replace(calibration, subject=subject)

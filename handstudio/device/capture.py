@@ -29,6 +29,7 @@ from handstudio.device.orders import (
     Ask,
     Connect,
     Disconnect,
+    HeadingTaken,
     Newest,
     NotePage,
     Order,
@@ -540,6 +541,7 @@ class Capture:
             self._reports.append(error)
             return
         self._turn_to(turned.heading_rad)
+        self._reports.append(HeadingTaken(sensor))
 
     # --- the take -------------------------------------------------------------------------------
 

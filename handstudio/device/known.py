@@ -9,6 +9,7 @@ import msgspec
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import CalibrationError
+from handstudio.layout import divisible, glove
 from handstudio.setup import AnyFilter, Setup, calibrated
 
 
@@ -37,8 +38,12 @@ class Known:
         mine = self.sensors is not None and self.sensors.device == serial
         sensors = self.sensors if mine else None
         fits = len(self.heading_rad) == len(setup.layout.sensors)
+        layout = setup.layout
+        if self.subject is None and divisible(layout):  # as it comes, whoever wore it before
+            layout = glove(layout.side, layout.names)
         setup = msgspec.structs.replace(
             setup,
+            layout=layout,
             heading_rad=self.heading_rad if fits else (),
             filter=setup.filter if self.filter is None else self.filter,
         )

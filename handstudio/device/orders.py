@@ -171,5 +171,12 @@ class TakeDone:
     path: Path
 
 
-Report: TypeAlias = TakeDone | HandstudioError
-"""What the capture thread tells once: a take that is done, or something that went wrong."""
+@dataclass(frozen=True, slots=True)
+class HeadingTaken:
+    """The heading was taken anew; of one sensor or, with None, of all."""
+
+    sensor: str | None
+
+
+Report: TypeAlias = TakeDone | HeadingTaken | HandstudioError
+"""What the capture thread tells once: something that is done, or that went wrong."""

@@ -8,7 +8,7 @@ joint the elbow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal, TypeAlias
 
@@ -19,6 +19,10 @@ from handstudio.arrays import Array
 from handstudio.maths import so3
 
 HandSide: TypeAlias = Literal["left", "right"]
+
+HandType: TypeAlias = Literal[1, 2, 3]
+"""How the palm is divided: 1, one rigid block; 2, two blocks that both begin at the wrist; 3, a
+radial block from the wrist and an ulnar one hinged to it at the ulnar CMC."""
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
@@ -74,9 +78,30 @@ def _hand_joints() -> tuple[Joint, ...]:
 
 
 JOINTS = _hand_joints()
+"""Of a hand of type 3, in the order of the segments. In types 1 and 2 the ulnar block begins at the
+wrist, so that the same tree serves: the link to it has no length, and it turns with the radial
+block (1) or as its own sensor tells (2)."""
+
+ULNAR = "hand_ulnar"
+WRIST_ULNAR = Joint("wrist_ulnar", "forearm", ULNAR, 2)
+"""What turns the ulnar block of a hand of type 2: the wrist as that block sees it."""
+
 SEGMENTS = tuple(joint.child for joint in JOINTS)
 PARENTS = tuple(-1 if j.parent is None else SEGMENTS.index(j.parent) for j in JOINTS)
 DISTALS = tuple(f"{finger}_distal" for finger in FINGERS)
+
+
+@cache
+def joints_of(hand_type: HandType) -> tuple[Joint, ...]:
+    """The joints that sensors of such a hand lie on both sides of, from the root out."""
+    match hand_type:
+        case 1:
+            whole = (j for j in JOINTS if j.child != ULNAR)
+            return tuple(replace(j, parent="hand") if j.parent == ULNAR else j for j in whole)
+        case 2:
+            return tuple(WRIST_ULNAR if j.child == ULNAR else j for j in JOINTS)
+        case 3:
+            return JOINTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,14 +141,18 @@ class Skeleton:
 
 
 @cache
-def nominal_skeleton(side: HandSide, hand_length_m: float = ADULT_HAND_LENGTH_M) -> Skeleton:
-    """Type 3 hand (ulnar block hinged at the ulnar CMC) of mean adult proportions.
+def nominal_skeleton(
+    side: HandSide, hand_length_m: float = ADULT_HAND_LENGTH_M, hand_type: HandType = 3
+) -> Skeleton:
+    """A hand of mean adult proportions.
 
     Args:
         side: Which hand; the left is the right mirrored.
         hand_length_m: Wrist crease to the tip of the middle finger [m].
+        hand_type: How the palm is divided; at the flat hand every type looks alike.
     """
-    places = {**_palm_places(), **_finger_places()}
+    ulnar_block = _ULNAR_CMC if hand_type == 3 else np.zeros(3)
+    places = {**_palm_places(), ULNAR: ulnar_block, **_finger_places(ulnar_block)}
     joint = np.array([places[name] for name in SEGMENTS]) * hand_length_m
     rest = np.tile(so3.IDENTITY, (len(SEGMENTS), 1))
     rest[SEGMENTS.index("thumb_metacarpal")] = _thumb_rest()
@@ -139,21 +168,20 @@ def _palm_places() -> dict[str, Array]:
     return {
         "forearm": np.zeros(3),
         "hand": np.array([0.0, _FOREARM_PER_HAND, 0.0]),
-        "hand_ulnar": _ULNAR_CMC,
         "thumb_metacarpal": _THUMB_CMC,
         "thumb_proximal": np.array([0.0, _METACARPAL["thumb"], 0.0]),
         "thumb_distal": np.array([0.0, _PROXIMAL["thumb"], 0.0]),
     }
 
 
-def _finger_places() -> dict[str, Array]:
+def _finger_places(ulnar_block: Array) -> dict[str, Array]:
     places = {}
     for finger in FINGERS[1:]:
         splay = np.deg2rad(_SPLAY[finger])
         mcp = _METACARPAL[finger] * np.array([np.sin(splay), np.cos(splay), 0.0])
         mcp[2] = _ARCH[finger]
         ulnar = finger in ("ring", "little")
-        places[f"{finger}_proximal"] = mcp - _ULNAR_CMC if ulnar else mcp
+        places[f"{finger}_proximal"] = mcp - ulnar_block if ulnar else mcp
         places[f"{finger}_intermediate"] = np.array([0.0, _PROXIMAL[finger], 0.0])
         places[f"{finger}_distal"] = np.array([0.0, _INTERMEDIATE[finger], 0.0])
     return places

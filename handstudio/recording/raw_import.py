@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -17,6 +16,7 @@ import pyarrow.parquet
 
 from handstudio.arrays import Array
 from handstudio.errors import ImportFolderError, LayoutError
+from handstudio.hand.skeleton import HandType
 from handstudio.layout import JointPlace, Layout, SensorPlace, glove
 from handstudio.protocol.packets import TIP_SENSOR, sensor_name
 from handstudio.recording.header import Header, Summary
@@ -163,9 +163,10 @@ _READERS: dict[str, Callable[[Path], pa.Table]] = {
 def _layout(folder: Path, table: pa.Table) -> Layout:
     path = folder / "layout.toml"
     if not path.exists():
-        return _glove_layout(folder, table)
+        return _glove_layout(folder, table, _LayoutFile())
     try:
-        return _parse_layout(tomllib.loads(path.read_text(encoding="utf-8")))
+        file = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), _LayoutFile)
+        return _parse_layout(file) if file.hand_type is None else _glove_layout(folder, table, file)
     except (OSError, ValueError) as error:  # not readable, not UTF-8, not TOML, not a layout
         raise ImportFolderError(
             "{path}: not a layout ({reason}).", _GUIDE, path=path, reason=error
@@ -176,35 +177,42 @@ def _layout(folder: Path, table: pa.Table) -> Layout:
         ) from error
 
 
-def _glove_layout(folder: Path, table: pa.Table) -> Layout:
-    """The layout of a folder that does not bring one: the glove's sensors, and no others."""
+def _glove_layout(folder: Path, table: pa.Table, file: _LayoutFile) -> Layout:
+    """The layout of a folder that names no sensors: the glove's, and no others."""
+    if file.sensors or file.joints:
+        raise LayoutError(
+            "hand_type divides the palm of the glove's own sensors, and there are others too.",
+            "Leave hand_type out: the joints say how the palm is divided.",
+        )
     named = {name.rpartition("_gyr_")[0] for name in table.column_names if "_gyr_" in name}
     known = [name for name in (*glove().names, sensor_name(TIP_SENSOR)) if name in named]
     unknown = sorted(named - set(known))
     if unknown:
         raise ImportFolderError(
-            "{folder}: there is no layout.toml, and the glove has no sensor {sensors}.",
+            "{folder}: no layout.toml names the sensors, and the glove has no sensor {sensors}.",
             _LAYOUT_GUIDE,
             folder=folder,
             sensors=", ".join(unknown),
         )
     if not known:
         raise ImportFolderError(
-            "{folder}: there is no layout.toml, and no SN1_gyr_x ...", _LAYOUT_GUIDE, folder=folder
+            "{folder}: no layout.toml names the sensors, and no SN1_gyr_x ...",
+            _LAYOUT_GUIDE,
+            folder=folder,
         )
-    return glove("right", known)
+    return glove("right" if file.side == "unknown" else file.side, known, file.hand_type)
 
 
 class _LayoutFile(msgspec.Struct):
     """What layout.toml holds."""
 
-    sensors: dict[str, str]
+    sensors: dict[str, str] = {}
     joints: tuple[JointPlace, ...] = ()
     side: str = "unknown"
+    hand_type: HandType | None = None
 
 
-def _parse_layout(document: dict[str, Any]) -> Layout:
-    file = msgspec.convert(document, _LayoutFile)
+def _parse_layout(file: _LayoutFile) -> Layout:
     sensors = tuple(SensorPlace(name, segment) for name, segment in file.sensors.items())
     return Layout(file.side, sensors, file.joints)
 

@@ -20,7 +20,7 @@ from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .page import begin_recording, button, choose, drawing, field, look, record
+from .page import begin_recording, button, changed, choose, drawing, field, look, record
 
 pytestmark = pytest.mark.browser
 
@@ -127,10 +127,18 @@ def test_looks_are_chosen_and_kept(start_studio: Start, visit: Callable[..., Pag
     page.mouse.click(660, 360)  # keys go to the field that was clicked last, until another is
     page.keyboard.press("5")
     page.keyboard.press("n")
+    with drawing(page):
+        bare = look(page)
+        page.keyboard.press("b")  # skin alone: nothing is seen through it
+        page.wait_for_timeout(1500)
+        assert changed(bare, look(page)) > 0.01
+    page.keyboard.press("b")
+    page.keyboard.press("g")
     page.wait_for_timeout(1000)
     studio.process.send_signal(signal.SIGINT)
     studio.process.communicate(timeout=30)
     kept = json.loads((studio.sessions.parent / "settings.json").read_bytes())
+    assert (kept["shown"]["skin"], kept["shown"]["bones"]) == (False, True)
     assert (kept["theme"], kept["camera"], kept["shown"]["labels"]) == ("light", "follow", True)
 
     page = visit(start_studio("--virtual"))

@@ -13,6 +13,7 @@ from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, S
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.known import Known
 from handstudio.device.orders import (
+    HeadingTaken,
     ResetHeading,
     SetFilter,
     SetHeading,
@@ -131,7 +132,7 @@ def test_a_reset_turns_headings_without_a_rest_and_twice_is_as_once(connected):
     connected.send(ResetHeading("SN1"))
     connected.go_on(5)
     assert not connected.newest.motion.doubt.any()
-    assert not connected.reports
+    assert connected.reports == [HeadingTaken(None), HeadingTaken("SN1")]
 
 
 def test_the_heading_stays_while_a_take_is_recorded(connected):

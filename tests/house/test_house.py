@@ -98,8 +98,9 @@ def test_the_wheel_holds_the_packages_and_every_mesh(tmp_path: Path) -> None:
     meshes = {f"app/assets/meshes/{mesh.name}" for mesh in (ROOT / "assets/meshes").glob("*.ply")}
     assert meshes
     assert meshes <= names
+    assert "handstudio/assets/meshes/hand.npz" in names
     assert {"handstudio/__init__.py", "app/__init__.py"} <= names
-    assert not [name for name in names if name.endswith("make_meshes.py")]
+    assert not [name for name in names if name.startswith("assets") or "make_" in name]
     assert any(name.endswith("/licenses/LICENSE") for name in names)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 from pathlib import Path
 from types import ModuleType
@@ -79,3 +80,13 @@ def _load(name: str) -> trimesh.Trimesh:
     mesh = trimesh.load_mesh(MESHES / f"{name}.ply", process=False)
     assert isinstance(mesh, trimesh.Trimesh)
     return mesh
+
+
+@pytest.mark.long
+def test_making_the_hand_again_gives_the_same_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(MESHES))
+    made = importlib.import_module("make_hand").make()
+    with np.load(MESHES / "hand.npz") as kept:
+        assert sorted(kept) == sorted(made)
+        for name, array in made.items():
+            np.testing.assert_allclose(kept[name], array, atol=1e-5, err_msg=name)

@@ -6,12 +6,14 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handstudio import pipeline
+from handstudio.calibration.correction import CorrectionFilter
 from handstudio.pipeline import Doubt, Motion
 from handstudio.samples import Event, Gap, ImuSamples, Why
 from handstudio.setup import Setup
@@ -49,6 +51,12 @@ def case(performance) -> Case:
         anew(samples[520:], first_us=777),
     ]
     return whole(performance.setup, events)
+
+
+@pytest.fixture(scope="module")
+def corrected(case) -> Case:
+    """The same with the thesis's filter of outputs before fusion."""
+    return whole(msgspec.structs.replace(case.setup, correction=CorrectionFilter()), case.events)
 
 
 def whole(setup: Setup, events: list[Event]) -> Case:
@@ -113,6 +121,14 @@ def test_cutting_the_events_anywhere_changes_no_digit(case, cuts):
     motion, packed = in_pieces(case, cuts)
     same(motion, case.motion)
     assert packed == case.packed
+
+
+@settings(max_examples=10)
+@given(cuts=st.lists(st.integers(0, 590), max_size=8).map(sorted))
+def test_nor_where_outputs_are_corrected_first(corrected, cuts):
+    motion, packed = in_pieces(corrected, cuts)
+    same(motion, corrected.motion)
+    assert packed == corrected.packed
 
 
 def test_one_instant_at_a_time_changes_no_digit(case):

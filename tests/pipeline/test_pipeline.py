@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from handstudio import pipeline
+from handstudio.calibration.correction import CorrectionFilter
 from handstudio.calibration.rest import REST_S
 from handstudio.errors import SetupError
+from handstudio.fusion.raw import RawFilter
 from handstudio.layout import Layout, SensorPlace
 from handstudio.maths import so3
 from handstudio.pipeline import BRIDGE_S, Doubt, Motion
@@ -277,6 +279,51 @@ def test_a_saturated_reading_is_flagged(performance):
     motion = run(performance.setup, replace(performance.samples, saturated=saturated))
     flagged = np.argwhere(motion.doubt & Doubt.SATURATED)
     assert flagged.tolist() == [[200, 3]]
+
+
+# --- corrected outputs ------------------------------------------------------------------------
+
+
+def test_correction_is_off_and_when_on_what_is_fused_is_what_it_puts_out(performance):
+    setup, samples = performance.setup, performance.samples
+    assert setup.correction is None
+    correction = CorrectionFilter()
+    on = msgspec.structs.replace(setup, correction=correction)
+    state = correction.begin(len(setup.layout.sensors), setup.rate_hz)
+    put_out, _ = correction.run(state, samples, np.ones(len(samples)))
+    corrected = run(on, samples).q_world_sensor
+    np.testing.assert_array_equal(corrected, run(setup, put_out).q_world_sensor)
+    assert not np.array_equal(corrected, run(setup, samples).q_world_sensor)
+
+
+def test_it_takes_noise_off_a_resting_sensor_and_lags_behind_a_moving_one(perfect):
+    setup = msgspec.structs.replace(perfect.setup, filter=RawFilter())
+    on = msgspec.structs.replace(setup, correction=CorrectionFilter())
+    samples = perfect.samples
+    shaken = 0.3 * np.random.default_rng(4).standard_normal(samples.gyr[:100].shape)
+    noisy = replace(samples[:100], gyr=samples.gyr[:100] + shaken)
+    steps = [_steps_deg(run(one, noisy)).mean() for one in (setup, on)]
+    assert steps[1] < 0.6 * steps[0]
+    behind = error_deg(run(on, samples), run(setup, samples).q_world_sensor)[130:190, 3]
+    fast = np.rad2deg(np.linalg.norm(samples.gyr[130:190, 3], axis=-1))
+    assert behind.max() == pytest.approx(0.015 * fast.max(), rel=0.3)  # 1 / lambda
+
+
+def _steps_deg(motion: Motion) -> np.ndarray:
+    q = motion.q_world_sensor[60:]
+    return np.rad2deg(so3.angle_between(q[1:], q[:-1]))
+
+
+def test_nothing_of_before_a_long_gap_is_in_what_is_corrected_after_it(performance):
+    setup = msgspec.structs.replace(performance.setup, correction=CorrectionFilter())
+    samples = performance.samples
+    _, over = pipeline.run(setup, pipeline.begin(setup), [samples[:100], samples[150:160]])
+    _, anew = pipeline.run(setup, pipeline.begin(setup), [samples[150:160]])
+    np.testing.assert_array_equal(over.correction.level, anew.correction.level)
+    later = replace(samples[150:160], time_us=samples.time_us[:10])
+    restart = [samples[:100], Gap(Why.RESTART, 0, 10_000), later]
+    _, over = pipeline.run(setup, pipeline.begin(setup), restart)
+    np.testing.assert_array_equal(over.correction.level, anew.correction.level)
 
 
 # --- states that are none ---------------------------------------------------------------------

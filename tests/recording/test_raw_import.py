@@ -12,7 +12,7 @@ import pyarrow.parquet
 import pytest
 
 from handstudio.errors import ImportFolderError, TakeError
-from handstudio.kinematics import has_start
+from handstudio.kinematics import exported_angles, has_start
 from handstudio.layout import JointPlace, glove
 from handstudio.maths import so3
 from handstudio.pipeline import Doubt
@@ -145,6 +145,48 @@ def test_the_folder_is_not_changed_and_no_take_is_overwritten(folder, tmp_path):
     paths = [import_folder(place, tmp_path / "sessions", "S01") for _ in range(3)]
     assert [path.name for path in paths] == ["foreign.mcap", "foreign-2.mcap", "foreign-3.mcap"]
     assert {path.name: path.read_bytes() for path in place.iterdir()} == before
+
+
+@pytest.mark.parametrize("hand_type", [1, 2, 3])
+def test_a_glove_whose_palm_is_divided_otherwise(folder, tmp_path, hand_type):
+    text = f'side = "left"\nhand_type = {hand_type}\n'
+    names = ("SN1", "SN4", "SN8", "SN11")
+    take = open_take(import_folder(folder(columns(*names), text), tmp_path, "S01"))
+    assert take.header.setup.layout == glove("left", names, hand_type)
+    motion = process(take)
+    names = {angle.name for angle in exported_angles(take.header.setup, motion)}
+    assert ("ulnar_cmc_flexion" in names) == (hand_type == 3)
+    assert "ring_mcp_flexion" in names
+
+
+def test_a_tree_of_ones_own_says_the_hand_type_by_its_joints(folder, tmp_path):
+    text = """
+side = "right"
+[sensors]
+A = "forearm"
+B = "hand"
+C = "hand_ulnar"
+D = "ring_proximal"
+[[joints]]
+name = "wrist"
+parent = "forearm"
+child = "hand"
+axes = 2
+[[joints]]
+name = "wrist_ulnar"
+parent = "forearm"
+child = "hand_ulnar"
+axes = 2
+[[joints]]
+name = "ring_mcp"
+parent = "hand_ulnar"
+child = "ring_proximal"
+axes = 2
+"""
+    place = folder(columns("A", "B", "C", "D"), text)
+    layout = open_take(import_folder(place, tmp_path, "S01")).header.setup.layout
+    assert layout.is_hand
+    assert layout.hand_type == 2
 
 
 def test_a_layout_of_ones_own_names(folder, tmp_path):
@@ -352,12 +394,14 @@ def test_seconds_since_1970_are_seconds(folder, tmp_path):
 
 
 def test_sensors_the_glove_does_not_have_need_a_layout(folder):
-    refused(folder(columns("SN1", "SN99")), r"no layout\.toml, and.*no sensor SN99", "layout.toml")
-    refused(folder(columns("left_foot")), r"no layout\.toml, and.*no sensor left_foot")
+    refused(folder(columns("SN1", "SN99")), r"no layout\.toml names.*no sensor SN99", "layout.toml")
+    refused(folder(columns("left_foot")), r"no layout\.toml names.*no sensor left_foot")
 
 
 def test_samples_of_nobody_need_a_layout(folder):
-    refused(folder({"time_s": np.arange(5.0), "x": np.ones(5)}), r"there is no layout\.toml")
+    refused(
+        folder({"time_s": np.arange(5.0), "x": np.ones(5)}), r"no layout\.toml names the sensors"
+    )
 
 
 def test_a_sensor_of_the_layout_without_columns(folder):
@@ -369,7 +413,9 @@ def test_a_sensor_of_the_layout_without_columns(folder):
     ("layout", "what"),
     [
         ("[sensors", r"layout\.toml: not a layout"),
-        ("", r"layout\.toml: not a layout.*sensors"),
+        ("", r"layout\.toml: The layout has no sensors"),
+        ("hand_type = 4", r"layout\.toml: not a layout.*hand_type"),
+        ('hand_type = 1\n[sensors]\nupper = "a"', r"layout\.toml: hand_type divides"),
         ("sensors = 5", r"layout\.toml: not a layout.*\$\.sensors"),
         ("[sensors]\nupper = 3", r"layout\.toml: not a layout.*str"),
         ('side = 1\n[sensors]\nupper = "a"', r"layout\.toml: not a layout.*side"),

@@ -142,6 +142,17 @@ def test_processing_writes_the_csv_that_exporting_writes(handstudio, take, tmp_p
     assert Path(result["csv"]).with_name(Path(result["csv"]).name + ".json").exists()
 
 
+def test_a_take_is_processed_with_outputs_corrected_and_as_another_type_of_hand(here, take):
+    written = {}
+    for asked in ((), ("--correction",), ("--hand-type", 1)):
+        (result,) = here("process", take, "--csv", "--json", *asked).json
+        written[asked] = Path(result["csv"]).read_bytes()
+    assert len(set(written.values())) == 3
+    assert b"ulnar_cmc_flexion" in written[()]
+    assert b"ulnar_cmc_flexion" not in written["--hand-type", 1]
+    assert b"ring_mcp_flexion" in written["--hand-type", 1]
+
+
 def test_several_takes_are_processed_in_one_go(here, take, recorded):
     said = here("process", take, recorded)
     assert said.code == 0

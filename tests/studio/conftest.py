@@ -16,6 +16,7 @@ from app.jobs import Jobs
 from app.review import Review
 from app.state import State
 from app.studio import Studio
+from handstudio.analysis.stretches import Stretch
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
 from handstudio.device.recorder import Recorder
@@ -31,6 +32,9 @@ from handstudio.recording.take import Take, open_take
 from handstudio.samples import ImuSamples
 from handstudio.settings import SettingsStore
 from handstudio.setup import Setup
+from handstudio.signals import signals
+from handstudio.survey import survey
+from handstudio.trim import trim
 
 TICK_S = 0.016
 
@@ -79,6 +83,15 @@ class PromptJobs:
 
     def process(self, path: Path, setup: Setup | None = None) -> Future[None]:
         return done(lambda: process(open_take(path), setup))
+
+    def survey(self, path: Path, setup: Setup | None = None) -> Future[tuple[Stretch, ...]]:
+        return done(lambda: survey(open_take(path), setup))
+
+    def signals(self, path: Path) -> Future[None]:
+        return done(lambda: signals(open_take(path)))
+
+    def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> Future[Path]:
+        return done(lambda: trim(open_take(path), begin_s, end_s, name=name))
 
     def export(
         self,

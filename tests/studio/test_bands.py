@@ -51,7 +51,7 @@ def test_bands_are_around_their_curves_and_without_holes(review: Review, studio:
     assert (edges[:, 0::2] >= values).all()
     np.testing.assert_allclose(edges[:, 0::2] - values, values - edges[:, 1::2], atol=1e-9)
     np.testing.assert_array_equal(edges[0, 0::2], values[0])
-    columns = _data(curves, slice(0, 5))
+    columns = _data(curves, slice(0, 5), 40.0)
     assert len(columns) == 1 + 10 + 5 + 1
     assert all(np.isfinite(column).all() for column in columns)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.boards import BOARD_M, boards_of
 from app.bones import bone_sets
 from app.meshes import mesh
 from handstudio.hand.angles import compose
@@ -16,6 +17,8 @@ from handstudio.hand.skeleton import (
     HandSide,
     nominal_skeleton,
 )
+from handstudio.hand_surface import skinned
+from handstudio.layout import glove
 from handstudio.maths import so3
 
 
@@ -40,3 +43,17 @@ def test_every_bone_of_a_digit_reaches_from_its_joint_to_the_next(side: HandSide
 def test_a_left_forearm_is_the_right_one_mirrored() -> None:
     right, left = mesh("forearm")[0], mesh("forearm", mirrored=True)[0]
     np.testing.assert_allclose(left * [-1.0, 1.0, 1.0], right)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_boards_lie_on_the_skin(side: HandSide) -> None:
+    skeleton = nominal_skeleton(side)
+    mesh, boards = skinned(skeleton), boards_of(glove(side), skeleton)
+    _, places = boards.placed(mesh.bound)
+    assert len(places) == 20
+    for name, place in zip(boards.names, places, strict=True):
+        offset = np.linalg.norm(mesh.vertices - place, axis=1)
+        nearest = int(offset.argmin())
+        assert offset[nearest] < 0.008, name
+        outside = float((place - mesh.vertices[nearest]) @ mesh.normals()[nearest])
+        assert -0.1 * BOARD_M < outside < 0.6 * BOARD_M, name

@@ -36,6 +36,7 @@ from handstudio.calibration.verdict import Reading, Verdict, What
 from handstudio.check import Checked
 from handstudio.device.orders import (
     Ask,
+    HeadingTaken,
     Newest,
     Phase,
     ResetHeading,
@@ -47,7 +48,7 @@ from handstudio.device.orders import (
     StopTake,
     TakeDone,
 )
-from handstudio.errors import CalibrationError, TakeError
+from handstudio.errors import CalibrationError, DeviceError, TakeError
 from handstudio.layout import glove
 from handstudio.protocol.commands import PERFORM
 from handstudio.recording.calibrations import save_calibration
@@ -503,6 +504,17 @@ def test_a_take_that_cannot_be_written_ends_in_words(guided: Guided) -> None:
 def test_headings_are_taken_anew(streaming: Studio, capture: StillCapture) -> None:
     after(streaming, intents.ResetHeading(), intents.ResetHeading("SN7"))
     assert capture.orders == [ResetHeading(None), ResetHeading("SN7")]
+
+
+def test_headings_taken_anew_are_told_when_they_were_and_not_when_it_was_refused(
+    streaming: Studio, capture: StillCapture
+) -> None:
+    assert after(streaming, intents.ResetHeading()).messages == ()
+    capture.waiting.append(DeviceError("No hand is shown yet.", "Connect a glove."))
+    assert [m.text for m in streaming.tick(0.016).messages] == ["No hand is shown yet."]
+    capture.waiting += [HeadingTaken(None), HeadingTaken("SN7")]
+    told = [m.text for m in streaming.tick(0.016).messages]
+    assert told == ["Heading taken anew: all sensors.", "Heading taken anew: SN7."]
 
 
 def test_a_refused_step_says_figure_limit_and_what_to_do(guided: Guided) -> None:

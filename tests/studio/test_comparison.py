@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 
 from app import comparison, intents
 from app.comparison import SMOOTHED, compared, setup_of
-from app.review import Review, opened
+from app.review import Review, compared_with, panned, zoomed
 from app.state import State
 from app.studio import Studio
 from app.views.comparison import choices, compared_ghost
 from app.views.page import caption_of, curves_of
 from handstudio.errors import HandstudioError
 from handstudio.fusion.tree_filter import TreeFilter
+from handstudio.maths import so3
 from handstudio.process import process
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take, open_take
@@ -66,26 +68,33 @@ def test_a_second_hand_is_shown_with_its_curves_and_by_how_much_they_differ(
     curves, ghost = curves_of(state), compared_ghost(state)
     assert curves is not None
     assert curves.second is not None
-    assert curves.rms_deg is not None
+    assert curves.rms is not None
     assert curves.second.shape == curves.values.shape
     assert ghost is not None
     assert not ghost.beside
+    assert choices()[name] in ghost.words
     assert choices()[name] in caption_of(state)
     if kept.header.setup.filter == FILTERS.get(name):
-        assert (curves.rms_deg == 0.0).all(), "with itself"
+        assert (curves.rms == 0.0).all(), "with itself"
     assert after(studio, intents.Compare("")).review.comparison is None  # type: ignore[union-attr]
 
 
-def test_the_figure_is_the_root_of_the_mean_square(review: Review) -> None:
-    plotted = review.plotted
-    other = compared("vqf", review.setup, review.motion, plotted, review.plot_values + 358.0)
-    np.testing.assert_allclose(other.rms_deg, 2.0)
+def test_the_figure_is_the_root_of_the_mean_square_of_what_is_seen(review: Review) -> None:
+    turned = so3.multiply(so3.about_z(np.deg2rad(2.0)), review.motion.q_world_sensor)
+    bent = replace(review.motion, q_world_sensor=np.array(review.motion.q_world_sensor))
+    bent.q_world_sensor[400:, 0] = turned[400:, 0]  # the forearm's alone, from four seconds on
+    other = compared_with(replace(review, compare="vqf"), review.setup, bent)
+    assert other.seen.rms is not None
+    assert 0.5 < np.nanmax(other.seen.rms) < 2.0
+    early = panned(zoomed(other, 4.0), -9.0)
+    assert early.to_s < 4.0
+    assert early.seen.rms is not None
+    assert np.nanmax(early.seen.rms) == 0.0
 
 
 def test_the_second_hand_is_at_the_time_of_the_first(review: Review) -> None:
     late = review.motion[3:]
-    first = opened(review.take, late)
-    second = compared("vqf", review.setup, late, first.plotted, first.plot_values)
+    second = compared("vqf", review.setup, late)
     np.testing.assert_array_equal(second.at(1.0).time_us, late.time_us[100:101])
     np.testing.assert_array_equal(second.at(1e9).time_us, late.time_us[-1:])
 

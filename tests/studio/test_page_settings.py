@@ -6,17 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
+import numpy as np
 import pytest
 
 from app import intents, words
 from app.jobs import Jobs
-from app.look import View, camera_for
+from app.look import ABOVE_SHEET, FIELD_RAD, View, camera_for
 from app.review import Review
 from app.state import State
 from app.studio import Studio
 from app.views import calibration as calibration_view
 from app.views import health as health_view
-from app.views.page import HandView, overlay_of, scene_of, status_of
+from app.views.page import HandView, camera_of, overlay_of, scene_of, status_of
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Phase
 from handstudio.health.findings import PER_SENSOR, Finding, Kind
@@ -96,6 +97,21 @@ def test_every_view_sees_the_whole_hand(review: Review, view: View, studio: Stud
     distance = float(((camera.place - camera.target) ** 2).sum() ** 0.5)
     assert 0.25 < distance < 0.8
     assert abs(float((camera.up**2).sum()) - 1.0) < 1e-9
+
+
+def test_an_open_takes_hand_stands_clear_of_the_sheet_below(review: Review, studio: Studio) -> None:
+    state = replace(studio.state, review=review)
+    shown = scene_of(state)
+    assert isinstance(shown, HandView)
+    for view in View:
+        camera = camera_of(replace(state, view=view), shown)
+        before = camera_for(view, shown.skeleton, shown.pose, state.yaw or 0.0)
+        ahead = (camera.target - camera.place) / np.linalg.norm(camera.target - camera.place)
+        towards = before.target - camera.place
+        up = float(towards @ camera.up) - float(towards @ ahead) * float(ahead @ camera.up)
+        up /= float(np.sqrt(1.0 - (ahead @ camera.up) ** 2))
+        share = up / float(towards @ ahead) / (2.0 * np.tan(FIELD_RAD / 2))
+        assert share == pytest.approx(ABOVE_SHEET)
 
 
 def test_palm_and_back_are_opposite_and_the_thumb_is_at_the_side(

@@ -19,7 +19,7 @@ def test_a_take_opens_at_its_beginning_and_paused(review: Review) -> None:
     assert not review.playing
     assert review.index == 0
     assert review.duration_s == pytest.approx(8.0, abs=0.05)
-    assert len(review.plot_time_s) == len(review.plot_values)
+    assert len(review.seen.time_s) == len(review.seen.values)
 
 
 def test_playing_takes_as_long_as_it_took(review: Review) -> None:
