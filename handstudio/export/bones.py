@@ -5,6 +5,7 @@ Of each segment, in the order of `SEGMENTS`; the frames are y up (`y_up`), lengt
 
 from __future__ import annotations
 
+import numpy as np
 from jaxtyping import Float
 
 from handstudio.arrays import Array
@@ -44,7 +45,11 @@ def tips(skeleton: Skeleton) -> dict[int, Float[Array, " 3"]]:
 
 
 def ends(skeleton: Skeleton, segment: int) -> list[Float[Array, " 3"]]:
-    """The joints and the tip that a segment carries, in its frame turned y up."""
+    """The joints and the tip that a segment carries, in its frame turned y up.
+
+    Not a joint that lies where the segment begins: an undivided palm's second block.
+    """
     carried = [skeleton.t_parent_joint[child] for child in CHILDREN[segment]]
     tip = tips(skeleton).get(segment)
-    return [turned_points(each) for each in (carried if tip is None else [*carried, tip])]
+    every = carried if tip is None else [*carried, tip]
+    return [turned_points(each) for each in every if np.any(each)]

@@ -20,6 +20,7 @@ from handstudio.export.part import Processed
 from handstudio.export.tables import POINTS
 from handstudio.hand.skeleton import FINGERS, SEGMENTS
 from handstudio.pipeline import join
+from handstudio.setup import divided
 
 from .conftest import GAP
 
@@ -261,6 +262,15 @@ def test_another_viewer_shows_the_flat_hand_of_glb(into, whole):
 
 
 # --- all of them ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hand_type", [1, 2])
+def test_palms_that_are_divided_otherwise_are_drawn_too(into, whole, hand_type):
+    other = Processed(whole.take, divided(whole.setup, hand_type), whole.motion)
+    scene = trimesh.load(into("glb", other))
+    assert np.isfinite(scene.bounds).all()
+    spread = glb_points(into("glb", other))[2] - bvh_points(into("bvh", other))[1]
+    assert np.abs(spread).max() < 0.1
 
 
 def test_all_formats_agree_to_a_tenth_of_a_millimetre(into, whole):
