@@ -5,10 +5,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import trimesh
 from jaxtyping import Float, Int
 
+from app.ply import read_ply
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
 
@@ -28,8 +27,7 @@ def mesh(name: str, mirrored: bool = False) -> tuple[Float[Array, "v 3"], Int[Ar
     for folder in _PLACES:
         path = folder / f"{name}.ply"
         if path.exists():
-            loaded = trimesh.load_mesh(path, process=False)
-            vertices, faces = np.array(loaded.vertices, dtype=float), np.array(loaded.faces)
+            vertices, faces = read_ply(path.read_bytes())
             if mirrored:
                 return vertices * [-1.0, 1.0, 1.0], faces[:, ::-1]
             return vertices, faces

@@ -20,7 +20,6 @@ from handstudio.export.part import Window
 from handstudio.pipeline import Motion
 from handstudio.process import process_head
 from handstudio.recording.parcel import SUFFIX, pack, take_in
-from handstudio.recording.raw_import import import_folder
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
@@ -246,6 +245,8 @@ class Workshop:
 
 def _taken_in(name: str, content: bytes | None, sessions: Path) -> Path:
     """A file or folder of this computer, or what a page sent, in the library."""
+    from handstudio.recording.raw_import import import_folder  # noqa: PLC0415 - takes a while
+
     path = Path(name).expanduser()
     if content is None:
         return (

@@ -28,8 +28,9 @@ def show(found: dict[str, Any]) -> None:
                 ("fingertips from the elbow [mm]", "fingertip_mm", "elbow"),
                 ("fingertips in the hand [mm]", "fingertip_mm", "hand"),
                 ("scatter of headings, SD [deg]", "heading_sd_deg"),
+                *_INSIDE,
             )
-            if (what, *path) not in _FUNCTIONAL or _at(ours, *path) is not None
+            if (what, *path) not in (*_FUNCTIONAL, *_INSIDE) or _at(ours, *path) is not None
         ],
     )
     _show_sensors(found)
@@ -71,6 +72,11 @@ def picture(found: dict[str, Any], path: Path) -> None:
     figure.savefig(path, dpi=90)
     plt.close(figure)
 
+
+_INSIDE = (
+    ("errors within two SD, orientations [share]", "inside_two_sd", "own"),
+    ("errors within two SD, relative [share]", "inside_two_sd", "relative"),
+)
 
 _FUNCTIONAL = (
     ("  against functional frames, mean [deg]", "orientation_deg", "functional", "mean"),

@@ -130,7 +130,8 @@ def _offline() -> dict[str, float]:
     """A minute's take from its bytes to a CSV of angles, and smoothed, against real time."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
-        path = simulate(Path(folder), seconds=60.0)
+        # with its health, as a recorded take has it: else an export works that out first
+        path = simulate(Path(folder), seconds=60.0, health=True)
         take = open_take(path)
         for name in ("tree", "vqf"):
             setup = replace_filter(take.header.setup, name)

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.calibrated import Asked, calibrated_hand, functional_frames, kept
+from benchmarks.honesty import inside_two_sd
 from handstudio import pipeline
 from handstudio.analysis.hand_error import (
     HandPoints,
@@ -86,6 +87,8 @@ class Figures(msgspec.Struct, frozen=True):
         segments: Total of every segment that carries a sensor, against the simulator's frames.
         functional: The same against frames by true functional axes; with ``own`` alone.
         definition: How far these are from the simulator's; with ``own`` alone.
+        inside: Share of errors within two standard deviations, own and relative; of a filter
+            that tells them.
         angles: Of every joint angle.
         tips_elbow, tips_hand: Of every fingertip, thumb to little finger.
         places_elbow: Of every sensor, from the elbow.
@@ -102,6 +105,7 @@ class Figures(msgspec.Struct, frozen=True):
     places_elbow: dict[str, float]
     functional: dict[str, float] = {}
     definition: dict[str, float] = {}
+    inside: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -326,6 +330,7 @@ def compare(followed: Followed, calibration: Calibration) -> Figures:
         places_elbow=dict(zip(sensors.names, places.tolist(), strict=True)),
         functional=functional,
         definition=definition,
+        inside=inside_two_sd(followed.setup, motion, truth.q_world_sensor[part]),
     )
 
 

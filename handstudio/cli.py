@@ -36,7 +36,6 @@ from handstudio.health.record import TakeHealth
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
-from handstudio.recording.raw_import import import_folder
 from handstudio.recording.recovery import recover as recover_file
 from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
@@ -249,6 +248,8 @@ def import_(
         hand_length_mm: Wrist crease to the tip of the middle finger.
         sessions: Folder of the takes.
     """
+    from handstudio.recording.raw_import import import_folder  # noqa: PLC0415 - takes a while
+
     hand = _hand(hand_length_mm)
     path = import_folder(folder, library.sessions_folder(sessions), subject, name, hand)
     out.print(str(path))

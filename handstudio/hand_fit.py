@@ -54,17 +54,7 @@ def fit_of(setup: Setup) -> HandFit:
     Raises:
         LayoutError: the layout is not a hand's.
     """
-    if not setup.layout.is_hand:
-        raise LayoutError(
-            "There is no hand in this recording.",
-            "{why} {why.remedy}",
-            why=setup.layout.no_hand,
-        )
-    if setup.subject is not None:
-        return _calibrated(_Same(setup))
-    side: HandSide = "left" if setup.layout.side == "left" else "right"
-    skeleton = nominal_skeleton(side, setup.hand.hand_length_m, setup.layout.hand_type)
-    return HandFit(skeleton, nominal_mounting(setup.layout))
+    return _fit(_Same(setup))
 
 
 def fit_of_calibration(calibration: SubjectCalibration, layout: Layout) -> HandFit:
@@ -129,10 +119,19 @@ class _Same:
 
 
 @lru_cache(maxsize=16)
-def _calibrated(same: _Same) -> HandFit:
+def _fit(same: _Same) -> HandFit:
     setup = same.setup
-    assert setup.subject is not None
-    return fit_of_calibration(setup.subject, setup.layout)
+    if not setup.layout.is_hand:
+        raise LayoutError(
+            "There is no hand in this recording.",
+            "{why} {why.remedy}",
+            why=setup.layout.no_hand,
+        )
+    if setup.subject is not None:
+        return fit_of_calibration(setup.subject, setup.layout)
+    side: HandSide = "left" if setup.layout.side == "left" else "right"
+    skeleton = nominal_skeleton(side, setup.hand.hand_length_m, setup.layout.hand_type)
+    return HandFit(skeleton, nominal_mounting(setup.layout))
 
 
 @lru_cache(maxsize=16)

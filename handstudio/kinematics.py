@@ -17,7 +17,7 @@ from handstudio.hand.angles import (
 from handstudio.hand.pose import Pose, posed
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton, joints_of
 from handstudio.hand.skin import taken_off
-from handstudio.hand_fit import HandFit, fit_of, skin_of_calibration
+from handstudio.hand_fit import HandFit, fit_of
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.pipeline import Motion
@@ -141,6 +141,7 @@ def doubtful_segments(setup: Setup, doubt: Array) -> Bool[Array, "n k"]:
             out[:, index] = doubt[:, drivers[name]] != 0
         elif PARENTS[index] >= 0:
             out[:, index] = out[:, PARENTS[index]]
-    if setup.subject is not None and skin_of_calibration(setup.subject, setup.layout).by_hand:
+    skin = fit_of(setup).skin if setup.layout.is_hand else None
+    if skin is not None and skin.by_hand:
         out[:, SEGMENTS.index("forearm")] |= out[:, SEGMENTS.index("hand")]
     return out

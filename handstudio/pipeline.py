@@ -176,6 +176,13 @@ def reheaded(before: Setup, after: Setup, state: State) -> State:
     return replace(state, filter=after.filter.turned(state.filter, turns), q_world_start=start)
 
 
+def rejoined(setup: Setup, state: State) -> State:
+    """What a state becomes where the hand changes, or how the glove sits on it, to this setup's."""
+    if not sees_all(setup.filter):
+        return state
+    return replace(state, filter=setup.filter.rejoined(state.filter))
+
+
 _FIELDS = ("time_us", "q_world_sensor", "q_world_start", "doubt", "sd_rad")
 
 

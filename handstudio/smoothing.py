@@ -65,13 +65,14 @@ class Smoother:
             return pipeline.empty(len(self._setup.layout.sensors))
         whole = pipeline.join(self._motions)
         stretches = self._taping.stretches
-        q = smoothed(stretches, mechanism_of(self._setup))
+        q, sd = smoothed(stretches, mechanism_of(self._setup))
         ends = list(accumulate(_shown(stretch) for stretch in stretches))
         done = int(np.searchsorted(ends, count, side="right"))
         count = ends[done - 1] if done else 0  # stretches are not cut
         del stretches[:done]
         self._motions = [whole[count:]]
-        return replace(whole[:count], q_world_sensor=q[:count])
+        sure = sd[:count].astype(np.float32)
+        return replace(whole[:count], q_world_sensor=q[:count], sd_rad=sure)
 
 
 def _shown(stretch: Stretch | None) -> int:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import msgspec
 
 from handstudio.errors import SetupError
 from handstudio.protocol.decoder import Decoder, decoder_named
-from handstudio.protocol.packets import Packet
+from handstudio.protocol.packets import ImuPacket, Packet, Restart
 from handstudio.samples import Event, Gap, ImuSamples, Ranges, Why, from_packets
 
 
@@ -34,8 +36,28 @@ class EventStream:
     def feed(self, chunk: bytes, arrival_ns: int) -> tuple[list[Packet], list[Event]]:
         """Decode a chunk that arrived at host time ``arrival_ns``."""
         packets = self._decoder.feed(chunk)
+        return packets, self._events(packets, arrival_ns)
+
+    def feed_all(self, chunks: Iterable[tuple[int, bytes]]) -> list[Event]:
+        """The events of chunks one after the other: the same instants in longer runs."""
+        events: list[Event] = []
+        waiting, newest_ns = list[Packet](), 0
+        for arrival_ns, chunk in chunks:
+            packets = self._decoder.feed(chunk)
+            if self._restarted or any(isinstance(packet, Restart) for packet in packets):
+                # how long it was away is told by when its next instant came
+                events += self._events(waiting, newest_ns)
+                events += self._events(packets, arrival_ns)
+                waiting = []
+                continue
+            waiting += packets
+            if any(isinstance(packet, ImuPacket) for packet in packets):
+                newest_ns = arrival_ns
+        return events + self._events(waiting, newest_ns)
+
+    def _events(self, packets: list[Packet], arrival_ns: int) -> list[Event]:
         if self.ranges is None:
-            return packets, []
+            return []
         events: list[Event] = []
         for event in from_packets(packets, self.ranges):
             match event:
@@ -45,7 +67,7 @@ class EventStream:
                     events.append(event)
                 case ImuSamples():
                     events += [*self._restart_before(arrival_ns), event]
-        return packets, events
+        return events
 
     def save(self) -> bytes:
         """Everything the next chunk's meaning depends on."""

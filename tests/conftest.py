@@ -11,7 +11,7 @@ import jaxtyping
 import pytest
 
 # Must stand before anything imports handstudio. From here on every annotated call into it is
-# checked; a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@njit``.
+# checked; a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@compiled``.
 jaxtyping.install_import_hook("handstudio", "beartype.beartype")
 
 DATA_VARIABLE = "HANDSTUDIO_DATA"

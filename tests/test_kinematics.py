@@ -259,3 +259,12 @@ def test_where_the_hand_turns_the_forearm_its_doubt_is_the_forearms():
     for one, doubtful in ((setup_of(layout), {"hand"}), (setup, {"hand", "forearm"})):
         found = doubtful_segments(one, doubt)[0]
         assert {SEGMENTS[k] for k in np.flatnonzero(found)} == doubtful
+
+
+def test_a_hand_is_made_once_for_a_setup_and_anew_for_another():
+    setup = setup_of(glove())
+    assert fit_of(setup) is fit_of(setup)
+    other = msgspec.structs.replace(setup, hand=HandModel(hand_length_m=0.25))
+    assert not np.allclose(
+        fit_of(other).skeleton.t_parent_joint, fit_of(setup).skeleton.t_parent_joint
+    )

@@ -21,6 +21,7 @@ from handstudio.process import kept_motion, process
 from handstudio.protocol.codec import encode
 from handstudio.protocol.decoder import V1Decoder
 from handstudio.protocol.packets import ImuPacket
+from handstudio.recording import take as take_module
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import FirstState, Take, open_take, pack_first_state
@@ -303,6 +304,7 @@ def test_memory_does_not_grow_with_the_length_of_a_take(tmp_path):
 @pytest.mark.parametrize("kind", ["wire", "samples"])
 def test_progress_goes_steadily_from_nothing_to_all(kind, take, tmp_path, monkeypatch):
     monkeypatch.setattr(process_module, "_BATCH", 25)
+    monkeypatch.setattr(take_module, "_CHUNKS", 1)
     told: list[float] = []
     one = take if kind == "wire" else long_take(tmp_path / "long.mcap", 10_000)
     process(one, progress=told.append)

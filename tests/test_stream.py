@@ -92,6 +92,18 @@ def test_cutting_the_bytes_changes_no_event(seed):
     assert joined(cut) == joined(fresh().feed(EVENTFUL, 7)[1])
 
 
+@given(st.integers(0), st.integers(1, 9))
+def test_chunks_taken_together_tell_what_they_tell_one_by_one(seed, together):
+    away = encode(replace(ABOUT, epoch=3)) + encode(ABOUT)[:3] + b"\0"
+    said = EVENTFUL + away + instants(range(5), epoch=3)
+    chunks = [(k * k * MS, piece) for k, piece in enumerate(pieces(said, random.Random(seed)))]
+    one, all_ = fresh(), fresh()
+    single = [event for at, chunk in chunks for event in one.feed(chunk, at)[1]]
+    groups = [chunks[k : k + together] for k in range(0, len(chunks), together)]
+    assert joined([e for group in groups for e in all_.feed_all(group)]) == joined(single)
+    assert all_.save() == one.save()
+
+
 def test_saving_and_resuming_between_any_two_bytes_changes_no_event():
     stream = fresh()
     seen: list[Event] = []

@@ -123,14 +123,15 @@ def scene_of(state: State) -> HandView | SensorsView | None:
     setup, motion = shown
     if not setup.layout.is_hand:
         return SensorsView(setup.layout.names, motion.q_world_sensor[0])
-    pose = pose_of(setup, motion.q_world_sensor)
+    fit = fit_of(setup)
+    pose = pose_of(setup, motion.q_world_sensor, fit)
     doubtful = doubtful_segments(setup, motion.doubt & ~np.uint8(Doubt.SILENT))[0]
     dead = doubtful_segments(setup, motion.doubt & np.uint8(Doubt.SILENT))[0]
     single = Pose(pose.q_world_segment[0], pose.t_world_joint[0], pose.t_world_tip[0])
     lit = frozenset[str]()
     if state.review is None and state.shaking is not None and state.shaking.sensor is not None:
         lit = frozenset({setup.layout.names[state.shaking.sensor]})
-    return HandView(setup.layout, fit_of(setup).skeleton, single, doubtful, dead, lit)
+    return HandView(setup.layout, fit.skeleton, single, doubtful, dead, lit)
 
 
 def overlay_of(state: State) -> str:

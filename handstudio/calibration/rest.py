@@ -46,14 +46,16 @@ def first_rest(recent: ImuSamples, sensor: int, window: int, start: int) -> tupl
         instant depends on the window before it alone, so it is the same in any chunking.
     """
     start = max(start, window - 1)
-    if start >= len(recent):
-        return None
-    still = _still(recent, sensor, window)
-    for end in np.flatnonzero(still[start - window + 1 :]) + start:
-        rest = _rest(recent[end - window + 1 : end + 1], sensor)
-        if rest is not None:
-            return int(end), rest
+    for first in range(start, len(recent), _AT_ONCE * window):  # it mostly comes soon
+        part = recent[first - window + 1 : first + _AT_ONCE * window]
+        for end in np.flatnonzero(_still(part, sensor, window)) + first:
+            rest = _rest(recent[end - window + 1 : end + 1], sensor)
+            if rest is not None:
+                return int(end), rest
     return None
+
+
+_AT_ONCE = 4  # windows' lengths
 
 
 def _still(recent: ImuSamples, sensor: int, window: int) -> Bool[Array, " m"]:

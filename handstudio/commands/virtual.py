@@ -12,14 +12,7 @@ from handstudio.commands.arguments import Json
 from handstudio.errors import SetupError
 from handstudio.hand.skeleton import HandSide
 from handstudio.recording import library
-from handstudio.recording.material import material
-from handstudio.recording.simulated import rehearse
-from handstudio.recording.simulated import simulate as simulate_take
 from handstudio.shell import out, print_json, print_table, progress
-from handstudio.simulation.imperfections.strengths import PRESETS, parse
-from handstudio.simulation.imperfections.table import TABLE
-from handstudio.simulation.motions.catalogue import motions as all_motions
-from handstudio.simulation.motions.manners import MANNERS
 
 
 def motions(*, json: Json = False) -> int:
@@ -28,6 +21,12 @@ def motions(*, json: Json = False) -> int:
     Args:
         json: Print JSON for a program instead of words.
     """
+    from handstudio.recording.material import material  # noqa: PLC0415 - all of a virtual person
+    from handstudio.simulation.imperfections.strengths import PRESETS  # noqa: PLC0415
+    from handstudio.simulation.imperfections.table import TABLE  # noqa: PLC0415
+    from handstudio.simulation.motions.catalogue import motions as all_motions  # noqa: PLC0415
+    from handstudio.simulation.motions.manners import MANNERS  # noqa: PLC0415
+
     known = all_motions()
     recordings = sorted(material().recordings)
     if json:
@@ -91,11 +90,14 @@ def simulate(
             start and name give the same file to the last bit.
         out_folder: Folder of the takes (default: as the studio's).
     """
+    from handstudio.recording import simulated  # noqa: PLC0415 - all of a virtual person
+    from handstudio.simulation.imperfections.strengths import parse  # noqa: PLC0415
+
     strengths, begin = parse(imperfections), _begin(start)
     with progress("simulating", quiet=False) as share:
-        path = simulate_take(
+        path = simulated.simulate(
             library.sessions_folder(out_folder),
-            rehearse(subject, motion, strengths, seed, side=side),
+            simulated.rehearse(subject, motion, strengths, seed, side=side),
             seconds=seconds,
             rate_hz=rate,
             name=name,

@@ -506,6 +506,8 @@ class Capture:
         # what a filter remembers is of other readings, or another filter's
         if (other.sensors, other.filter) != (setup.sensors, setup.filter):
             self._begin_anew(other)
+        elif other.subject != setup.subject and self._state is not None:
+            self._state = pipeline.rejoined(other, self._state)
         if other != setup:
             self.newest = replace(self.newest, setup=other)
 
@@ -546,13 +548,16 @@ class Capture:
     # --- the take -------------------------------------------------------------------------------
 
     def _set_hand(self, hand: HandModel) -> None:
-        """The hand decides nothing the pipeline remembers: its state goes on."""
+        """Of what the pipeline remembers only what it learnt of the joints is this hand's."""
         setup, wanted = self.newest.setup, self._wanted
         if wanted is None or self.newest.recorder is not None:
             return  # the setup of a take is fixed
         wanted.order = replace(wanted.order, hand=hand)
-        if setup is not None:
-            self.newest = replace(self.newest, setup=msgspec.structs.replace(setup, hand=hand))
+        if setup is not None and hand != setup.hand:
+            other = msgspec.structs.replace(setup, hand=hand)
+            if self._state is not None:
+                self._state = pipeline.rejoined(other, self._state)
+            self.newest = replace(self.newest, setup=other)
 
     def _start_take(self, order: StartTake) -> None:
         setup = self.newest.setup

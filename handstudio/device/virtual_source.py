@@ -13,8 +13,6 @@ from handstudio.device.serial_source import SerialSource
 from handstudio.device.source import ByteSource, SourceLost
 from handstudio.device.tcp_source import TcpSource
 from handstudio.errors import DeviceError
-from handstudio.simulation.imperfections.strengths import parse as parse_imperfections
-from handstudio.simulation.motions.language import parse as parse_motions
 
 START_S = 20.0
 """How long a virtual glove may take to start on a busy machine."""
@@ -92,8 +90,11 @@ def _start(options: dict[str, str]) -> subprocess.Popen[str]:
             unknown=", ".join(sorted(unknown)),
             options=", ".join(_OPTIONS),
         )
-    parse_motions(options.get("motion", "showcase"))
-    parse_imperfections(options.get("imperfections", "plain"))
+    from handstudio.simulation.imperfections import strengths  # noqa: PLC0415 - all of a person
+    from handstudio.simulation.motions import language  # noqa: PLC0415
+
+    language.parse(options.get("motion", "showcase"))
+    strengths.parse(options.get("imperfections", "plain"))
     tcp = options.get("transport") == "tcp" or sys.platform == "win32"
     command = [sys.executable, "-m", "handstudio.device.virtual_glove", "--quit-with-parent"]
     command += ["--tx-buffer", str(_TX_BUFFER)]

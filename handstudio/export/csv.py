@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-import pyarrow as pa
-import pyarrow.csv
-
 from handstudio.export.part import Part
 from handstudio.export.tables import table_of
 
 
 def write(part: Part, file: BinaryIO) -> None:
     """Write the table, and how many sensors were in doubt."""
+    import pyarrow as pa  # noqa: PLC0415 - takes a while to load
+    import pyarrow.csv  # noqa: PLC0415
+
     table = table_of(part)
     options = pa.csv.WriteOptions(include_header=True, quoting_style="none")
     names = ["time_s", *table.names, "doubtful_sensors"]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import BinaryIO
 
 import msgspec
-import pyarrow as pa
-import pyarrow.parquet
 
 from handstudio.export.part import Part
 from handstudio.export.tables import table_of
@@ -17,6 +15,9 @@ KEY = b"handstudio"
 
 def write(part: Part, file: BinaryIO) -> None:
     """Write the table, and how many sensors were in doubt."""
+    import pyarrow as pa  # noqa: PLC0415 - takes a while to load
+    import pyarrow.parquet  # noqa: PLC0415
+
     table = table_of(part)
     fields = [(name, pa.float64()) for name in ("time_s", *table.names)]
     about = {KEY: msgspec.json.encode(part.about)}

@@ -128,6 +128,10 @@ class WholeFilter(Filter[State], Protocol[State]):
         """The state with sensors turned in the world: ``q_world_sensor = turns q_world_sensor``."""
         ...
 
+    def rejoined(self, state: State) -> State:
+        """The state on another mechanism: what was learnt of the old joints is forgotten."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fused(Generic[State]):

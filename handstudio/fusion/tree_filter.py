@@ -52,7 +52,8 @@ class TreeState:
         scalar: And this.
         turn: By how much the axes of the joint before a sensor are found to be off, in the sensor.
         root: Slow means of the force at a root, in the world, its variance, and since when.
-        slow: Variance of that; how far its compass is off, and variance; two of the kernel's.
+        slow: Variance of that (negative: not told yet); how far its compass is off, and variance;
+            two of the kernel's.
     """
 
     period_s: float
@@ -195,7 +196,7 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
             np.zeros((sensors, 9)),
             np.zeros(2),
             zeros,
-            np.tile([-1.0, 0.0, self.mag_off**2, 0.0, 0.0], (sensors, 1)),
+            np.tile([_UNTOLD, 0.0, self.mag_off**2, 0.0, 0.0], (sensors, 1)),
             np.zeros((sensors, 8)),
         )
 
@@ -241,6 +242,12 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
             root=np.zeros_like(state.root),
             edge=np.zeros_like(state.edge),  # neighbours are where they were not
         )
+
+    def rejoined(self, state: TreeState) -> TreeState:
+        """The state on other joints: how far axes are off is forgotten, orientations stay."""
+        slow = state.slow.copy()
+        slow[:, 0] = _UNTOLD
+        return replace(state, slow=slow, turn=np.zeros_like(state.turn))
 
     def run(
         self,
@@ -329,6 +336,9 @@ class TreeFilter(msgspec.Struct, frozen=True, tag="tree"):
         }
         return Beliefs(**known, unknown_tilt=_UNKNOWN_TILT, unknown_heading=_UNKNOWN_HEADING)
 
+
+_UNTOLD = -1.0
+"""In place of how well axes are known, until the first run tells it by the mechanism."""
 
 _UNKNOWN_TILT = float(np.deg2rad(10.0))
 _UNKNOWN_HEADING = float(np.deg2rad(20.0))

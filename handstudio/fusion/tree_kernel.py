@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
 from handstudio.fusion import (
     tree_learn,
@@ -15,15 +13,16 @@ from handstudio.fusion import (
     tree_small,
     tree_sweep,
 )
+from handstudio.fusion.tree_compiled import compiled, kept, stamp
 from handstudio.fusion.tree_learn import learn, rested
 from handstudio.fusion.tree_observe import observe
 from handstudio.fusion.tree_parts import HEEDED, ODD, PLACED, Work
 from handstudio.fusion.tree_propagate import apart, began, propagate
 from handstudio.fusion.tree_small import inverse3, matrix, times_by_rows, turned_before
-from handstudio.fusion.tree_sweep import spread_of, swept
+from handstudio.fusion.tree_sweep import swept, worst_of
 
 
-@njit
+@compiled
 @no_type_check
 def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
     """Correct the instant before by its own readings; the new rates tell how its rates changed."""
@@ -54,7 +53,7 @@ def _correct(beliefs, m, st, gyr, flags, dt, w, sweep, x):
             rested(beliefs, s, st, period)
 
 
-@njit
+@compiled
 @no_type_check
 def _turn_mean(mean, x, at):
     """What was averaged was seen in the orientation that is corrected now."""
@@ -64,7 +63,7 @@ def _turn_mean(mean, x, at):
     mean[at + 2] += x[0] * b - x[1] * a
 
 
-@njit
+@compiled
 @no_type_check
 def _remember(st, gyr, acc, mag, flags):
     for s in range(len(flags)):
@@ -83,26 +82,11 @@ def _remember(st, gyr, acc, mag, flags):
         st.past[s, 1] = flags[s]
 
 
-def _stamp() -> int:
-    """A number that changes with any of the code that is compiled into the loop."""
-    known = (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
-    code = [
-        (kernel.py_func.__code__.co_code, repr(kernel.py_func.__code__.co_consts))
-        for names in (*map(vars, known), globals())
-        for kernel in names.values()
-        if hasattr(kernel, "py_func")
-    ]
-    constants = [
-        repr((k, v)) for names in map(vars, known) for k, v in names.items() if k.isupper()
-    ]
-    return zlib.crc32(repr((code, constants)).encode()) | 1
-
-
 @no_type_check
-def _compiled(stamp):
+def _compiled(known_by):
     """The loop. It alone is kept on disk, under the stamp: it is never older than its source."""
 
-    @njit(cache=True)
+    @kept
     @no_type_check
     def run(beliefs, m, st, gyr, acc, mag, flags, dt, out, sd, tape):
         """Fuse consecutive instants; the memory ``st`` is changed in place.
@@ -118,7 +102,7 @@ def _compiled(stamp):
             sd: And how sure they are (n, s, 2).
             tape: What a smoother needs, where there is room for it.
         """
-        assert stamp != 0
+        assert known_by != 0
         after, sure, follow, spreads = tape
         n, taped = len(m.order), len(after) > 0
         w = Work(
@@ -155,10 +139,9 @@ def _compiled(stamp):
             _remember(st, gyr[k], acc[k], mag[k], flags[k])
             for s in range(n):
                 out[k, s] = st.q[s]
-                own = st.cov[s, 0, 0] + st.cov[s, 1, 1] + st.cov[s, 2, 2]
-                sd[k, s, 0] = np.sqrt(own / 3.0)
                 p = m.parent[s]
-                sd[k, s, 1] = np.sqrt(spread_of(p, s, p >= 0, st.cov, st.edge) / 3.0)
+                sd[k, s, 0] = np.sqrt(worst_of(p, s, False, st.cov, st.edge))
+                sd[k, s, 1] = np.sqrt(worst_of(p, s, p >= 0, st.cov, st.edge))
             st.scalar[0], st.scalar[1] = dt[k], 1.0
             if taped:
                 spreads[k] = added
@@ -166,4 +149,6 @@ def _compiled(stamp):
     return run
 
 
-run = _compiled(_stamp())
+_PARTS = (tree_small, tree_sweep, tree_observe, tree_learn, tree_propagate)
+
+run = _compiled(stamp(*map(vars, _PARTS), globals()))

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_observe import axis_of
 from handstudio.fusion.tree_small import rotated
 from handstudio.fusion.tree_sweep import spread_of
 
 
-@njit
+@compiled
 @no_type_check
 def learn(beliefs, m, st, w, x, period):
     """What stays off: each is one number's Kalman filter, beside the orientations.
@@ -33,7 +33,7 @@ def learn(beliefs, m, st, w, x, period):
             _axes_off(beliefs, m, st, s, w, period)
 
 
-@njit
+@compiled
 @no_type_check
 def _axes_off(beliefs, m, st, s, w, period):
     """How far a joint's axes are off in the sensor beyond it, as its neighbour sees them."""
@@ -54,7 +54,7 @@ def _axes_off(beliefs, m, st, s, w, period):
         st.turn[s, i] += gain * back
 
 
-@njit
+@compiled
 @no_type_check
 def rested(beliefs, s, st, period):
     """A sensor that has been still for long tells the bias of its gyroscope."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_parts import FRESH, GRAVITY, HEEDED, SATURATED
 from handstudio.fusion.tree_small import (
     at_joint,
@@ -19,7 +19,7 @@ from handstudio.fusion.tree_small import (
 from handstudio.fusion.tree_sweep import spread_of
 
 
-@njit
+@compiled
 @no_type_check
 def joint_to(fp, fc, weight, p, c, info, pull, cross):
     """Both sides see one vector: ``exp(xp) fp = exp(xc) fc`` but for noise, weighed."""
@@ -39,7 +39,7 @@ def joint_to(fp, fc, weight, p, c, info, pull, cross):
     pull[c, 2] += weight * (fc[0] * e1 - fc[1] * e0)
 
 
-@njit
+@compiled
 @no_type_check
 def observe(beliefs, m, st, dt, gyr, flags, w):
     """Gather what the instant before tells: information, pull, and coupling along edges."""
@@ -68,7 +68,7 @@ def observe(beliefs, m, st, dt, gyr, flags, w):
             _compass(beliefs, m, st, s, period, w)
 
 
-@njit
+@compiled
 @no_type_check
 def _seen_from(m, st, s, period, w):
     """The attitude in which a reading was taken: means are of half a step before their instant."""
@@ -81,7 +81,7 @@ def _seen_from(m, st, s, period, w):
     matrix(w.quat, w.rot[s])
 
 
-@njit
+@compiled
 @no_type_check
 def _rates(st, s, gyr, flag, dt, before, w):
     """Rates of the instant before, and how they changed: by the newest ones, where there are."""
@@ -98,7 +98,7 @@ def _rates(st, s, gyr, flag, dt, before, w):
             w.there[s, i] = 0.0
 
 
-@njit
+@compiled
 @no_type_check
 def _lever_doubt(m, s, at, w):
     """Variance of an acceleration carried over a lever that is off [m²/s⁴]; rates of sensor at."""
@@ -108,7 +108,7 @@ def _lever_doubt(m, s, at, w):
     return m.lever_sd[s] ** 2 * (change + fast * fast)
 
 
-@njit
+@compiled
 @no_type_check
 def _gravity(beliefs, m, st, s, period, w):
     """What is felt at the root, in the long run, is gravity: nothing gathers speed for ever.
@@ -134,7 +134,7 @@ def _gravity(beliefs, m, st, s, period, w):
     cross_to(w.vy, w.vx, -weight, w.pull[s])
 
 
-@njit
+@compiled
 @no_type_check
 def _shared_force(beliefs, m, st, s, period, w):
     """Both sensors beside a joint feel one force there (4.29)."""
@@ -152,7 +152,7 @@ def _shared_force(beliefs, m, st, s, period, w):
     joint_to(other, mine, weight, p, s, w.info, w.pull, w.cross)
 
 
-@njit
+@compiled
 @no_type_check
 def _axes(beliefs, m, st, s, period, w):
     """A hinge has one axis in both its segments; two axes of a joint stay square."""
@@ -179,7 +179,7 @@ def _axes(beliefs, m, st, s, period, w):
             w.cross[s, i, j] -= v
 
 
-@njit
+@compiled
 @no_type_check
 def axis_of(rot, axis, turn, out):
     """An axis of a joint in the world: as calibrated, turned by what it was found to be off."""
@@ -191,7 +191,7 @@ def axis_of(rot, axis, turn, out):
         out[i] = (rot[i, 0] * t0 + rot[i, 1] * t1 + rot[i, 2] * t2) * n
 
 
-@njit
+@compiled
 @no_type_check
 def _compass(beliefs, m, st, s, period, w):
     """The field's horizontal part points along x, as far as it is the undisturbed field."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_parts import FRESH, HEEDED, ODD, SATURATED, TINY
 from handstudio.fusion.tree_small import (
     inverse3,
@@ -23,7 +23,7 @@ _SHARE_LASTS_S = 0.25  # a movement one way, in which a scale errs alike
 _MOST_JUMP = 0.2  # [rad] of doubt about one step
 
 
-@njit
+@compiled
 @no_type_check
 def began(beliefs, m, s, st, acc, mag, flag):
     """Attitude of a first reading: accelerometer for gravity, the compass for the heading."""
@@ -54,7 +54,7 @@ def began(beliefs, m, s, st, acc, mag, flag):
     st.past[s, 8] = 1.0
 
 
-@njit
+@compiled
 @no_type_check
 def apart(m, st, s):
     """A sensor whose orientation was set anew errs with none of its neighbours."""
@@ -64,7 +64,7 @@ def apart(m, st, s):
             st.edge[c] = 0.0
 
 
-@njit
+@compiled
 @no_type_check
 def propagate(beliefs, m, st, dt, gyr, flags, w, begins, added):
     """One step of the gyroscopes; the variance that it adds goes to added [rad²]."""
@@ -84,7 +84,7 @@ def propagate(beliefs, m, st, dt, gyr, flags, w, begins, added):
     _spread(beliefs, m, st, dt, w, added)
 
 
-@njit
+@compiled
 @no_type_check
 def _turned(beliefs, m, s, st, dt, gyr, flag, w):
     """Turn a sensor by the mean rate of the step; the variance of that."""
@@ -112,7 +112,7 @@ def _turned(beliefs, m, s, st, dt, gyr, flag, w):
     return variance
 
 
-@njit
+@compiled
 @no_type_check
 def _spread(beliefs, m, st, dt, w, added):
     """Covariances after the step: an error becomes ``x - dt R b``, b the error of the bias."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from handstudio.fusion.tree_compiled import compiled
 
 
-@njit
+@compiled
 @no_type_check
 def inverse3(a, b):
     """Inverse of a symmetric positive definite 3 x 3, into b."""
@@ -24,7 +25,7 @@ def inverse3(a, b):
     b[2, 2] = (a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]) * d
 
 
-@njit
+@compiled
 @no_type_check
 def matrix(q, m):
     """Rotation matrix of a quaternion, into m."""
@@ -40,7 +41,7 @@ def matrix(q, m):
     m[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit
+@compiled
 @no_type_check
 def _exp(x, y, z):
     """Quaternion of a rotation vector, in parts."""
@@ -53,7 +54,7 @@ def _exp(x, y, z):
     return c, s * x, s * y, s * z
 
 
-@njit
+@compiled
 @no_type_check
 def turned_before(q, x, y, z):
     """Turn a quaternion by a rotation vector in the world, in place: exp(v) q."""
@@ -65,7 +66,7 @@ def turned_before(q, x, y, z):
     q[3] = c * k + a * j - b * i + d * w
 
 
-@njit
+@compiled
 @no_type_check
 def turned_after(q, x, y, z):
     """Turn a quaternion by a rotation vector in its own frame, in place: q exp(v), unit again."""
@@ -80,7 +81,7 @@ def turned_after(q, x, y, z):
         q[u] *= n
 
 
-@njit
+@compiled
 @no_type_check
 def square_to(f, weight, a):
     """Add ``weight [f]x' [f]x = weight (f'f 1 - f f')`` to a."""
@@ -91,7 +92,7 @@ def square_to(f, weight, a):
             a[i, j] -= weight * f[i] * f[j]
 
 
-@njit
+@compiled
 @no_type_check
 def cross_to(f, e, weight, a):
     """Add ``weight f x e`` to a."""
@@ -100,7 +101,7 @@ def cross_to(f, e, weight, a):
     a[2] += weight * (f[0] * e[1] - f[1] * e[0])
 
 
-@njit
+@compiled
 @no_type_check
 def at_joint(acc, w, dw, r, out):
     """Specific force at a point r from the sensor: ``a + dw x r + w x (w x r)``, sensor frame."""
@@ -112,7 +113,7 @@ def at_joint(acc, w, dw, r, out):
     out[2] = acc[2] + dw[0] * r[1] - dw[1] * r[0] + w[0] * cy - w[1] * cx
 
 
-@njit
+@compiled
 @no_type_check
 def rotated(m, v, out):
     """Product of a matrix and a vector, into out."""
@@ -120,7 +121,7 @@ def rotated(m, v, out):
         out[i] = m[i, 0] * v[0] + m[i, 1] * v[1] + m[i, 2] * v[2]
 
 
-@njit
+@compiled
 @no_type_check
 def times_by_rows(a, b, out):
     """Matrix product ``a b``, into out."""

@@ -6,8 +6,8 @@ step adds, ``x_k+1 = x_k + n``, ``n`` of variance Q, so the smoothed error of th
     x_k = x_k|k + (1 - Q S) d,      d = x_k+1 - x_k+1|k
 
 with S the inverse of the covariance before the correction, which the filter's tree gives as a sum
-over sensors: nothing of the size of the whole hand is ever inverted. Biases stay as the filter had
-them.
+over sensors: nothing of the size of the whole hand is ever inverted. Covariances go back with it
+(`tree_earlier`). Biases stay as the filter had them.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ class Stretch:
     """Steps that follow one another.
 
     Attributes:
-        q_world_sensor: What the filter gave out after each.
+        q_world_sensor: What the filter gave out after each ...
+        sd_rad: ... and how sure it was.
         tape: What it kept of each.
         shown: Whether its instants are in the motion; over missing ones it only steps.
     """
 
     q_world_sensor: Float[Array, "n s 4"]
+    sd_rad: Float[Array, "n s 2"]
     tape: Tape
     shown: bool
 
@@ -71,6 +73,10 @@ class Taping:
     def turned(self, state: TreeState, turns: Float[Array, "s 4"]) -> TreeState:
         """As the filter."""
         return self._filter.turned(state, turns)
+
+    def rejoined(self, state: TreeState) -> TreeState:
+        """As the filter."""
+        return self._filter.rejoined(state)
 
     def pack(self, state: TreeState) -> bytes:
         """As the filter."""
@@ -119,30 +125,38 @@ class Taping:
         shown: bool,
     ) -> Fused[TreeState]:
         fused, tape = self._filter.recorded(state, samples, stretch, heeded, mechanism)
-        self.stretches.append(Stretch(fused.q_world_sensor, tape, shown))
+        self.stretches.append(Stretch(fused.q_world_sensor, fused.sd_rad, tape, shown))
         return fused
 
 
-def smoothed(stretches: Sequence[Stretch | None], mechanism: Mechanism) -> Float[Array, "n s 4"]:
-    """Orientations of all shown instants, the future up to the last of them taken in."""
-    parts, unbroken = list[Array](), list[Stretch]()
+def smoothed(
+    stretches: Sequence[Stretch | None], mechanism: Mechanism
+) -> tuple[Float[Array, "n s 4"], Float[Array, "n s 2"]]:
+    """Orientations of all shown instants, the future up to the last of them taken in.
+
+    Returns:
+        Orientations, and how sure they are, as `Fused` has it.
+    """
+    parts, unbroken = list[tuple[Array, Array]](), list[Stretch]()
     for stretch in (*stretches, None):
         if stretch is not None:
             unbroken.append(stretch)
         elif unbroken:
             parts.append(_backwards(unbroken, mechanism))
             unbroken = []
-    return np.concatenate(parts) if parts else np.empty((0, mechanism.sensors, 4))
+    if not parts:
+        return np.empty((0, mechanism.sensors, 4)), np.empty((0, mechanism.sensors, 2))
+    q, sd = zip(*parts, strict=True)
+    return np.concatenate(q), np.concatenate(sd)
 
 
-def _backwards(stretches: list[Stretch], mechanism: Mechanism) -> Array:
+def _backwards(stretches: list[Stretch], mechanism: Mechanism) -> tuple[Array, Array]:
     out = np.concatenate([s.q_world_sensor for s in stretches])
     tapes = [np.concatenate([getattr(s.tape, name) for s in stretches]) for name in Tape.__slots__]
     shown = np.concatenate([np.full(len(s.q_world_sensor), s.shown) for s in stretches])
-    result = out.copy()
-    _kernel()(mechanism.parent, out, *tapes, result)
-    kept: Array = result[shown]
-    return kept
+    q, sd = out.copy(), np.concatenate([s.sd_rad for s in stretches])
+    _kernel()(mechanism.order, mechanism.parent, out, *tapes, q, sd)
+    return q[shown], sd[shown]
 
 
 @no_type_check

@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from handstudio.fusion.tree_compiled import compiled
 from handstudio.fusion.tree_small import inverse3, rotated, times_by_rows
 
 
-@njit
+@compiled
 @no_type_check
 def spread_of(p, c, has_parent, cov, own):
     """Sum of the variances of a relative (or, without parent, of its own) orientation."""
@@ -28,7 +28,20 @@ def spread_of(p, c, has_parent, cov, own):
     return max(total, 0.0)
 
 
-@njit
+@compiled
+@no_type_check
+def worst_of(p, c, has_parent, cov, own):
+    """Of the same the largest variance about one axis of the world."""
+    worst = 0.0
+    for i in range(3):
+        v = cov[c, i, i]
+        if has_parent:
+            v += cov[p, i, i] - 2.0 * own[c, i, i]
+        worst = max(worst, v)
+    return worst
+
+
+@compiled
 @no_type_check
 def swept(order, parent, cov, edge, info, pull, cross, work, x):
     """One sweep towards the root and one back: new covariances, and the errors' means in x.
@@ -61,7 +74,7 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                     + follow[c, i, 2] * edge[c, j, 2]
                 )
                 t[i, j] = t[j, i] = v
-        if not _is_positive(t):  # rounding, or a model that is wrong: better to know less
+        if not is_positive(t):  # rounding, or a model that is wrong: better to know less
             edge[c], follow[c] = 0.0, 0.0
             t[:] = cov[c]
         inverse3(t, sure[c])
@@ -121,9 +134,9 @@ def swept(order, parent, cov, edge, info, pull, cross, work, x):
                 cov[c, i, j] = cov[c, j, i] = v
 
 
-@njit
+@compiled
 @no_type_check
-def _is_positive(a):
+def is_positive(a):
     """Whether a symmetric 3 x 3 is a covariance."""
     two = a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]
     c02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]

@@ -201,10 +201,10 @@ def _read_imu(payload: bytes) -> ImuPacket:
     wide = (n + 7) // 8
     counts_at = _IMU.size + 2 * wide
     _expect(n, len(payload) == counts_at + 18 * n)
+    if n % 8 and (payload[_IMU.size + wide - 1] | payload[counts_at - 1]) >> n % 8:
+        raise _RefusedError(Reason.CONTENT)
     packed = np.frombuffer(payload, np.uint8, 2 * wide, _IMU.size).reshape(2, wide)
     bits = np.unpackbits(packed, axis=1, bitorder="little").view(np.bool_)
-    if n % 8 and bits[:, n:].any():
-        raise _RefusedError(Reason.CONTENT)
     counts = np.frombuffer(payload, "<i2", 9 * n, counts_at).reshape(n, 9)
     return ImuPacket(epoch, Status(status), sequence, clock_us, bits[0, :n], bits[1, :n], counts)
 

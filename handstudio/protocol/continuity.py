@@ -79,10 +79,9 @@ def _follow_imu(state: Continuity, packet: ImuPacket, size: int) -> tuple[Contin
             return _anew(packet)
         strays = msgspec.structs.replace(state, strays=state.strays + 1)
         return strays, [Corruption(Reason.OUT_OF_ORDER, size)]
-    packet = replace(packet, sequence=instant.sequence, clock_us=instant.clock_us)
-    state = msgspec.structs.replace(
-        state, epoch_low=packet.epoch, last=instant, clock_us=instant.clock_us, strays=0
-    )
+    if (packet.sequence, packet.clock_us) != (instant.sequence, instant.clock_us):
+        packet = replace(packet, sequence=instant.sequence, clock_us=instant.clock_us)
+    state = Continuity(packet.epoch, state.epoch, state.sensors, instant, instant.clock_us)
     return state, [Missing(missing), packet] if missing else [packet]
 
 

@@ -6,6 +6,7 @@ import hashlib
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
@@ -63,6 +64,10 @@ def pack_first_state(state: FirstState) -> bytes:
     return msgspec.msgpack.encode(_PackedFirstState(state.stream, state.pipeline))
 
 
+_CHUNKS = 32
+"""Decoded at a time: a few make short runs of instants, and these cost more each."""
+
+
 @dataclass(frozen=True, slots=True)
 class Take:
     """A closed recording; `open_take` makes one."""
@@ -87,7 +92,7 @@ class Take:
             raise _damaged(self.path, ValueError(f"{self.summary.chunks - count} chunks missing"))
 
     def events(self, from_start: bool = False) -> Iterator[list[Event]]:
-        """Events in the order they came, chunk by chunk; memory does not grow with length.
+        """Events in the order they came, some seconds at a time; memory does not grow with length.
 
         Args:
             from_start: Decode as if nothing was known before the first byte.
@@ -97,8 +102,9 @@ class Take:
                 yield [decode_samples(data)]
             return
         stream = self.stream(from_start)
-        for arrival_ns, chunk in self.chunks():
-            yield stream.feed(chunk, arrival_ns)[1]
+        chunks = self.chunks()
+        while some := list(islice(chunks, _CHUNKS)):
+            yield stream.feed_all(some)
 
     def runs(self) -> list[ImuSamples]:
         """All its samples, run by run, gaps between them."""

@@ -11,7 +11,6 @@ from math import factorial
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import make_interp_spline
 
 from handstudio.arrays import Array
 from handstudio.hand.skeleton import JOINTS
@@ -179,6 +178,8 @@ def through_points(time_s: Float[Array, " m"], postures: Float[Array, "m c"]) ->
     """
     if len(time_s) == 2:
         return through_stops(time_s, postures)
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - takes a second to load
+
     rest = [(1, np.zeros(postures.shape[1])), (2, np.zeros(postures.shape[1]))]
     spline = make_interp_spline(time_s, postures, k=DEGREE, bc_type=(rest, rest))  # type: ignore[arg-type] # its hints know scalars only
     breaks = np.unique(spline.t)

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 
+from handstudio import pipeline
 from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors
 from handstudio.calibration.subject import SubjectCalibration
+from handstudio.device.capture import Capture, _Wanted
 from handstudio.device.known import Known
 from handstudio.device.orders import (
+    Connect,
     HeadingTaken,
     ResetHeading,
     SetFilter,
+    SetHand,
     SetHeading,
     SetSensors,
     SetSubject,
@@ -24,7 +29,8 @@ from handstudio.errors import CalibrationError, DeviceError
 from handstudio.fusion.raw import RawFilter
 from handstudio.fusion.tree_filter import TreeFilter
 from handstudio.fusion.vqf_filter import VqfFilter
-from handstudio.setup import NO_CALIBRATION
+from handstudio.layout import glove as glove_layout
+from handstudio.setup import NO_CALIBRATION, HandModel, Setup, calibrated
 from handstudio.warming import warm
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -41,6 +47,7 @@ HAND = SubjectCalibration(
     segments=(),
     tips=(),
 )
+KNOWN = msgspec.structs.replace(HAND, id="20260203-040506-001", hand_length_m=0.19)
 LEFT = msgspec.structs.replace(HAND, side="left")
 BIAS = 0.05
 
@@ -187,6 +194,26 @@ def test_a_take_keeps_the_filter_it_began_with_and_the_other_comes_after(connect
     assert take.header.setup.filter == VqfFilter()
     connected.check(take)
     connected.until(lambda newest: newest.setup.filter == RawFilter(), "it is used")
+
+
+@pytest.mark.parametrize(
+    "another", [SetSubject(HAND), SetSubject(None), SetHand(HandModel(hand_length_m=0.2))]
+)
+def test_of_another_hand_the_joints_are_learnt_anew_and_attitudes_stay(another):
+    setup = calibrated(Setup(glove_layout(), 100.0, filter=TreeFilter()), subject=KNOWN)
+    learnt = pipeline.begin(setup)
+    learnt = replace(learnt, filter=replace(learnt.filter, turn=np.ones((20, 3))))
+    capture = Capture()
+    capture.newest = replace(capture.newest, setup=setup)
+    capture._known = Known(subject=KNOWN, filter=setup.filter)
+    capture._wanted = _Wanted(Connect("nowhere"))
+    capture._state = learnt
+    capture._follow(SetSubject(KNOWN))
+    assert capture._state is learnt, "the same hand"
+    capture._follow(another)
+    assert capture.newest.setup != setup
+    assert not capture._state.filter.turn.any()
+    assert capture._state.filter.q is learnt.filter.q
 
 
 @pytest.mark.long

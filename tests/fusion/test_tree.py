@@ -13,7 +13,7 @@ import pytest
 from handstudio import pipeline
 from handstudio.arrays import Array
 from handstudio.fusion.mechanism import bare
-from handstudio.fusion.tree_filter import TreeFilter
+from handstudio.fusion.tree_filter import TreeFilter, TreeState
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.hand_fit import fit_of, hand_mechanism, mechanism_of
 from handstudio.layout import glove
@@ -226,6 +226,29 @@ def test_a_setup_may_say_where_a_joint_is_and_how_it_turns():
         so3.rotate(joints.q_parent_joint[1], np.array([1.0, 0.0, 0.0])), [1, 0, 0]
     )
     np.testing.assert_allclose(joints.t_sensor_joint[1], [0.0, -0.05, 0.0])
+
+
+def test_what_was_learnt_of_one_hands_axes_is_not_believed_of_the_next():
+    """The joints as they are, after ten seconds of axes that were told wrong."""
+    samples, truth = exact()
+    right = mechanism_of(SETUP)
+    off = so3.exp(np.random.default_rng(3).normal(0.0, np.deg2rad(10.0), (len(NAMES), 3)))
+    wrong = replace(right, q_sensor_joint=so3.multiply(off, right.q_sensor_joint))
+    tree, first, rest = TreeFilter(), samples[:1000], samples[1000:]
+    begun = tree.begin(len(NAMES), RATE_HZ)
+    misled = tree.fused(begun, first, np.ones(1000), first.valid, wrong).state
+    new = tree.rejoined(misled)
+    assert np.rad2deg(np.abs(misled.turn)).max() > 5.0
+    assert not new.turn.any()
+    np.testing.assert_array_equal(new.q, misled.q)
+    np.testing.assert_array_equal(new.cov, misled.cov)
+
+    def off_at_first(state: TreeState) -> float:
+        part = rest[:200]
+        q = tree.fused(state, part, np.ones(200), part.valid, right).q_world_sensor
+        return rms(np.rad2deg(so3.angle_between(q, truth[1000:1200])))
+
+    assert off_at_first(new) < off_at_first(misled)
 
 
 # --- named faults ---------------------------------------------------------------------------------

@@ -22,9 +22,6 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator, make_interp_spline
-from scipy.ndimage import median_filter
-from scipy.signal import butter, sosfiltfilt
 
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
@@ -79,6 +76,9 @@ def replayed(recording: HandRecording, actor: Actor) -> Trajectory:
             count=len(recording.time_s),
             seconds=_SHORTEST_S,
         )
+    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - takes a second to load
+    from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415
+
     angles = recorded_angles(recording)
     time_s = recording.time_s - recording.time_s[0]
     even = np.arange(0.0, time_s[-1], _EVERY_S)
@@ -173,6 +173,8 @@ def _of_palm(q_start_palm: Float[Array, "n 4"]) -> dict[str, Array]:
 
 def _outliers(values: Array) -> Array:
     """What stands out from the median of its neighbours (Hampel's rule)."""
+    from scipy.ndimage import median_filter  # noqa: PLC0415 - takes a second to load
+
     middle = median_filter(values, _NEIGHBOURS, mode="nearest")
     away = np.abs(values - middle)
     spread = 1.4826 * median_filter(away, _NEIGHBOURS, mode="nearest")
@@ -191,6 +193,8 @@ def _fitted(values: Array, low: float, high: float) -> Array:
 
 def _splined(even: Array, postures: Array) -> Trajectory:
     """A quintic spline, with ways from rest to its first state and from its last one to rest."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - takes a second to load
+
     spline = make_interp_spline(even, postures, k=DEGREE)
     x, v, a = (spline(even, nu=order) for order in range(3))
     still = np.zeros((1, postures.shape[1]))

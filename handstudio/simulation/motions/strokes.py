@@ -14,8 +14,6 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import make_interp_spline
-from scipy.ndimage import gaussian_filter1d
 
 from handstudio.arrays import Array
 from handstudio.errors import SetupError
@@ -162,6 +160,9 @@ def _between_corners(points: Array) -> list[tuple[int, int]]:
 
 
 def _piece(points: Array, hurry: float) -> Run:
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - takes a second to load
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415
+
     smooth = _smoothed(points)
     steps = np.linalg.norm(np.diff(smooth, axis=0), axis=-1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -182,6 +183,8 @@ def _piece(points: Array, hurry: float) -> Run:
 
 def _smoothed(points: Array) -> Array:
     """Without what a hand cannot follow; the ends stay."""
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415 - takes a second to load
+
     sigma = _ROUNDED_M / max(1e-9, float(np.linalg.norm(points[1] - points[0])))
     pad = min(len(points) - 1, int(4.0 * sigma) + 1)
     before = 2.0 * points[0] - points[pad:0:-1]
