@@ -1,18 +1,22 @@
-"""One colour a finger, the same in 3-D, plots and exports; safe for colour-blind eyes.
-
-After Okabe and Ito, Color Universal Design (2008), the green lightened for dark pages.
-"""
+"""Colours of the page: those of the fingers, and of all that is no part of a hand."""
 
 from __future__ import annotations
 
-THUMB = (230, 159, 0)
+from handstudio.colours import (
+    FOREARM,
+    INDEX,
+    LITTLE,
+    MIDDLE,
+    PARTS,
+    RING,
+    THUMB,
+    WRIST,
+    of_part,
+)
+
+__all__ = ["FOREARM", "INDEX", "LITTLE", "MIDDLE", "PARTS", "RING", "THUMB", "WRIST", "of_part"]
+
 THUMB_PALE = (255, 211, 120)  # a second curve of the thumb
-INDEX = (86, 180, 233)
-MIDDLE = (0, 178, 130)
-RING = (213, 94, 0)
-LITTLE = (204, 121, 167)
-WRIST = (226, 216, 178)
-FOREARM = (150, 162, 184)
 ALARM = (226, 75, 74)
 DEAD = (104, 108, 116)
 BOARD = (70, 92, 120)
@@ -22,24 +26,7 @@ SECOND = (132, 184, 255)  # the skin of a hand to compare with
 DOUBT = (96, 102, 112)  # hatching on skin
 LIT = (255, 236, 92)
 
-PARTS = {
-    "thumb": THUMB,
-    "index": INDEX,
-    "middle": MIDDLE,
-    "ring": RING,
-    "little": LITTLE,
-    "hand": WRIST,
-    "wrist": WRIST,
-    "forearm": FOREARM,
-    "elbow": FOREARM,
-}
-
 _CYCLE = (INDEX, THUMB, MIDDLE, LITTLE, RING, WRIST, FOREARM)
-
-
-def of_part(name: str) -> tuple[int, int, int]:
-    """Colour of a segment, joint or angle, by the finger or part its name begins with."""
-    return PARTS.get(name.split("_", maxsplit=1)[0], FOREARM)
 
 
 def of_index(index: int) -> tuple[int, int, int]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from app.look import View
-from handstudio.export.csv import Content
+from handstudio.export.part import Content
 from handstudio.wizards import course
 
 
@@ -379,10 +379,11 @@ class SetLoop:
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """Write a CSV into the library and send it to a page."""
+    """Write a file into the library and send it to a page."""
 
-    content: Content
+    content: Content | None  # None: the format has one, or a first
     page: int  # which open page asked
+    format: str = "csv"
 
 
 @dataclass(frozen=True, slots=True)

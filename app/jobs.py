@@ -15,7 +15,9 @@ from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import format_named
+from handstudio.export.part import Content, Processed, Window
 from handstudio.measure import Measured, measure
 from handstudio.process import kept_motion, process
 from handstudio.recording.take import open_take
@@ -62,11 +64,16 @@ class Jobs:
         return self._pool.submit(_process, path, setup)
 
     def export(
-        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+        self,
+        path: Path,
+        name: str,
+        content: Content | None,
+        window: Window,
+        setup: Setup | None = None,
     ) -> Future[Path]:
-        """Write a CSV of a part of a take, by its own setup or another."""
+        """Write a part of a take in a format, beside it, by its own setup or another."""
         self._reset()
-        return self._pool.submit(_export, path, target, content, window, setup)
+        return self._pool.submit(_export, path, name, content, window, setup)
 
     def measure(
         self, path: Path, window: Window, setup: Setup | None, earlier: Path | None
@@ -161,12 +168,14 @@ def _trim(path: Path, begin_s: float, end_s: float | None, name: str) -> Path:
 
 
 def _export(
-    path: Path, target: Path, content: Content, window: Window, setup: Setup | None
+    path: Path, name: str, content: Content | None, window: Window, setup: Setup | None
 ) -> Path:
-    take = open_take(path)
-    chosen = setup or take.header.setup
-    motion = process(take, chosen, progress=_tell)
-    return export_csv(take, chosen, motion, target, content=content, window=window)
+    take, chosen = open_take(path), format_named(name)
+    by = setup or take.header.setup
+    source = Processed(take, by, process(take, by, progress=_tell))
+    kind = chosen.content(content, by.layout)
+    target = chosen.target(path, kind)
+    return export(source, target, chosen, content=kind, window=window, progress=_tell)
 
 
 def _measure(path: Path, window: Window, setup: Setup | None, earlier: Path | None) -> Measured:

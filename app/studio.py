@@ -64,7 +64,7 @@ from handstudio.device.orders import (
     TakeDone,
 )
 from handstudio.errors import HandstudioError
-from handstudio.export.csv import Window
+from handstudio.export.part import Window
 from handstudio.pipeline import Motion
 from handstudio.process import kept_motion
 from handstudio.protocol.commands import PERFORM
@@ -645,7 +645,7 @@ class Studio:
         if review is None:
             return
         window = Window(review.in_s, review.out_s)
-        self._workshop.export(review.take.path, order.content, window, order.page, review.used)
+        self._workshop.export(review.take.path, order, window, review.used)
 
     def _measure(
         self, order: intents.CompareVisits | intents.MeasureHand | intents.MakeReport

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from app.found import Found
+from app.intents import Export
 from app.jobs import Jobs
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
-from handstudio.export.csv import Content, Window
+from handstudio.export.part import Window
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.process import process_head
@@ -219,16 +220,19 @@ class Workshop:
         self._pending.append(_Pending(self._aside.submit(pack, take, target), use, words))
 
     def export(
-        self, path: Path, content: Content, window: Window, page: int, setup: Setup | None = None
+        self,
+        path: Path,
+        order: Export,
+        window: Window,
+        setup: Setup | None = None,
     ) -> None:
-        """A CSV of a part of a take, beside it, by its own setup or another."""
-        target = path.with_suffix(f".{content}.csv")
+        """A part of a take in some format, beside it, by its own setup or another."""
 
         def use(written: Path) -> Outcome:
-            return Exported(Download(page, written.name, written))
+            return Exported(Download(order.page, written.name, written))
 
-        words = _("Exporting {name}").format(name=target.name)
-        future = self.jobs.export(path, target, content, window, setup)
+        words = _("Exporting {name}").format(name=f"{path.stem}, {order.format.upper()}")
+        future = self.jobs.export(path, order.format, order.content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
     def measure(

@@ -23,7 +23,9 @@ import tyro
 
 from handstudio import pipeline
 from handstudio.arrays import Array
-from handstudio.export.csv import export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Processed
 from handstudio.fusion.mechanism import bare
 from handstudio.fusion.tree_filter import TreeFilter
 from handstudio.fusion.vqf_filter import VqfFilter
@@ -135,7 +137,7 @@ def _offline() -> dict[str, float]:
             setup = replace_filter(take.header.setup, name)
             begin = time.perf_counter()
             motion = process(take, setup)
-            export_csv(take, setup, motion, path.with_suffix(f".{name}.csv"), content="angles")
+            export(Processed(take, setup, motion), path.with_suffix(f".{name}.csv"), FORMATS["csv"])
             found[f"offline_x_realtime_{name}"] = 60.0 / (time.perf_counter() - begin)
         begin = time.perf_counter()
         process(take, smoothing(take.header.setup))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import sys
@@ -15,28 +14,28 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numpy as np
 import tyro
 
 from handstudio.calibration.correction import CorrectionFilter
 from handstudio.commands import calibration as calibration_commands
-from handstudio.commands import keeping, sharing
+from handstudio.commands import exporting, keeping, sharing
 from handstudio.commands import virtual as virtual_commands
+from handstudio.commands.aligning import aligned
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
 from handstudio.commands.grasping import grasps
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
-from handstudio.commands.readings import show_verdicts
 from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Connect, Newest, Phase, StartTake, StopTake
 from handstudio.errors import DeviceError, HandstudioError, SetupError, TakeError
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Processed, Window
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandType
 from handstudio.health.record import TakeHealth
-from handstudio.process import aligned_setup
 from handstudio.process import process as process_take
 from handstudio.recording import library
 from handstudio.recording.header import Header
@@ -45,7 +44,7 @@ from handstudio.recording.subjects import HAND_MM
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.take_health import health_of_take
 from handstudio.settings import load_settings, settings_path
-from handstudio.setup import HandModel, Setup, divided, filter_named, smoothing
+from handstudio.setup import HandModel, divided, filter_named, smoothing
 from handstudio.shell import err, out, print_error, print_json, print_table, progress
 
 CONNECT_S = 25.0
@@ -211,7 +210,7 @@ def process(
         if hand_type is not None:
             setup = divided(setup, hand_type)
         if align:
-            setup = _aligned(take, setup)
+            setup = aligned(take, setup)
         if filter is not None:
             setup = msgspec.structs.replace(setup, filter=filter_named(filter))
         if correction:
@@ -222,51 +221,16 @@ def process(
             motion = process_take(take, setup, from_start=from_start, progress=share)
         result: dict[str, Any] = {"take": str(path), "instants": len(motion)}
         if csv:
-            content: Content = "angles" if setup.layout.is_hand else "orientations"
-            target = path.with_suffix(f".{content}.csv")
-            result["csv"] = str(export_csv(take, setup, motion, target, content=content))
+            table = FORMATS["csv"]
+            content = table.content(None, setup.layout)
+            source = Processed(take, setup, motion)
+            result["csv"] = str(export(source, table.target(path, content), table))
         results.append(result)
     if json:
         print_json(results)
     else:
         for result in results:
             out.print("  ".join(str(value) for value in result.values()))
-    return 0
-
-
-def export(
-    take: TakeFile,
-    *,
-    content: Content = "angles",
-    to: Path | None = None,
-    start_s: float = 0.0,
-    end_s: float | None = None,
-    calibration: str | None = None,
-    sensors: str | None = None,
-    align: bool = False,
-) -> int:
-    """Write joint angles, orientations or positions as CSV with a sidecar JSON.
-
-    Args:
-        take: The take.
-        content: What to write.
-        to: The file to write; beside the take unless given.
-        start_s: Begin of the window, seconds from the take's first instant.
-        end_s: End of the window; the end of the take unless given.
-        calibration: File of another subject calibration than the take carries, or none.
-        sensors: File of another calibration of the sensors than the take carries, or none.
-        align: Align the headings by the take's own quick start.
-    """
-    opened = open_take(take)
-    setup = calibration_commands.chosen(opened.header.setup, calibration, sensors)
-    if align:
-        setup = _aligned(opened, setup)
-    with progress(take.name) as share:
-        motion = process_take(opened, setup, progress=share)
-    target = to or take.with_suffix(f".{content}.csv")
-    window = Window(start_s, end_s)
-    export_csv(opened, setup, motion, target, content=content, window=window)
-    out.print(str(target))
     return 0
 
 
@@ -403,7 +367,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "record": record,
     "info": info,
     "process": process,
-    "export": export,
+    "export": exporting.export,
     "measure": measure,
     "report": report,
     "trace": trace,
@@ -447,18 +411,6 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         code = 130
     sys.exit(code)
-
-
-def _aligned(take: Take, setup: Setup) -> Setup:
-    """Headings by the take's own quick start; how well is said beside the result."""
-    setup, found = aligned_setup(take, setup)
-    known = [sd for sd in found.sd if math.isfinite(sd)]
-    words = "{take}: headings aligned, standard deviation {middle:.2f} deg (worst {worst:.2f})."
-    figures = np.rad2deg([float(np.median(known)), max(known)])
-    err.print(words.format(take=take.path.name, middle=figures[0], worst=figures[1]))
-    if not found.verdict.ok:
-        show_verdicts((found.verdict,))
-    return setup
 
 
 def _hand(length_mm: float) -> HandModel:

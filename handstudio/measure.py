@@ -16,7 +16,7 @@ from handstudio.analysis.posture_time import DEFAULT_BANDS, Band
 from handstudio.analysis.series import series_of
 from handstudio.analysis.whole import Asked, measures_of
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window, cut
+from handstudio.export.part import Window, cut
 from handstudio.hand.angles import hand_angles
 from handstudio.pipeline import Motion
 from handstudio.process import process

@@ -16,9 +16,12 @@ from app.panels.sheets import ask_deletion, ask_emptying
 from app.review import Review
 from app.state import Shelf, State
 from app.views.comparison import choices
+from app.views.formats import contents, offered
 from app.views.recording import clock_of
 from app.words import _, in_words
-from handstudio.export.csv import Content
+from handstudio.export.formats import Format
+from handstudio.export.part import Content
+from handstudio.layout import Layout, glove
 from handstudio.recording.library import Entry
 
 
@@ -37,11 +40,7 @@ class LibraryPanel:
         self._recover = gui.add_button(
             _("Recover this recording"), icon=viser.Icon.LIFEBUOY, visible=False
         )
-        self._csv = gui.add_button(
-            _("Export CSV"), icon=viser.Icon.DOWNLOAD, hint=_("Joint angles; key: E"), visible=False
-        )
-        self._contents = _contents(hand=True)
-        self._more = gui.add_dropdown(_("Contents"), tuple(self._contents), visible=False)
+        self._export = ExportFields(gui, send)
         self._motion = MotionFields(gui, send)
         self._measures = MeasuresFolder(gui, send)
         self._notes = NotesFolder(gui, send)
@@ -51,7 +50,6 @@ class LibraryPanel:
         self._search.on_update(typed(lambda text: send(intents.Search(text))))
         self._choice.on_update(typed(self._chosen))
         self._recover.on_click(lambda _event: self._ask_recovery())
-        self._csv.on_click(self.export)
 
     def render(self, state: State) -> None:
         """Show the library and the open take."""
@@ -64,16 +62,11 @@ class LibraryPanel:
                 self._choice.options = options
                 self._opened = None
         self._follow(review.take.path if review else None)
-        put(self._csv, visible=review is not None)
-        put(self._more, visible=review is not None)
         put(self._facts, content=self._words(state))
         entry = self._labels.get(self._choice.value)
         interrupted = entry is not None and entry.take is None and not entry.recording
         put(self._recover, visible=interrupted and review is None)
-        if review is not None:
-            self._contents = _contents(review.setup.layout.is_hand)
-            if self._more.options != tuple(self._contents):
-                self._more.options = tuple(self._contents)
+        self._export.render(review)
         self._motion.render(review, state.shelf.found)
         self._measures.render(state)
         self._notes.render(review)
@@ -82,8 +75,7 @@ class LibraryPanel:
 
     def export(self, event: Any) -> None:
         """Send the open take's file to the page that asked."""
-        content = self._contents.get(self._more.value, "orientations")
-        self._send(intents.Export(content, page_of(event)))
+        self._export.export(event)
 
     def bin(self) -> None:
         """The chosen take goes to the bin."""
@@ -123,6 +115,55 @@ class LibraryPanel:
         if entry is not None and entry.error is not None:
             return in_words(entry.error)[0] + "\n\n" + _("What was saved can be had back.")
         return _shelf_words(state.shelf)
+
+
+class ExportFields:
+    """The open take as a file: which format, what it holds, and the button."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._send = send
+        self._layout: Layout | None = None
+        self._formats: dict[str, Format] = offered(glove())
+        self._contents: dict[str, Content] = {}
+        self._button = gui.add_button(
+            _("Export {format}").format(format="CSV"),
+            icon=viser.Icon.DOWNLOAD,
+            hint=_("The part between in and out, or all of the take; key: E"),
+            visible=False,
+        )
+        self._format = gui.add_dropdown(_("Format"), tuple(self._formats), visible=False)
+        self._content = gui.add_dropdown(_("Contents"), (_("Joint angles"),), visible=False)
+        self._button.on_click(self.export)
+        self._format.on_update(lambda _event: self._offer())
+
+    def render(self, review: Review | None) -> None:
+        """Show what the open take can become."""
+        layout = None if review is None else review.setup.layout
+        if layout is not None and layout is not self._layout:
+            self._formats = offered(layout)
+            if self._format.options != tuple(self._formats):
+                self._format.options = tuple(self._formats)
+        self._layout = layout
+        put(self._button, visible=review is not None)
+        put(self._format, visible=review is not None)
+        self._offer()
+
+    def export(self, event: Any) -> None:
+        """Send the open take's file to the page that asked."""
+        content = self._contents.get(self._content.value)
+        self._send(intents.Export(content, page_of(event), self._chosen.name))
+
+    @property
+    def _chosen(self) -> Format:
+        return self._formats.get(self._format.value) or next(iter(self._formats.values()))
+
+    def _offer(self) -> None:
+        chosen = self._chosen
+        self._contents = {} if self._layout is None else contents(chosen, self._layout)
+        if self._contents and self._content.options != tuple(self._contents):
+            self._content.options = tuple(self._contents)
+        put(self._content, visible=len(self._contents) > 0)
+        put(self._button, label=_("Export {format}").format(format=chosen.name.upper()))
 
 
 class MotionFields:
@@ -384,13 +425,6 @@ def _zero(zero: str) -> str:
         )
     }
     return known.get(zero, zero)
-
-
-def _contents(hand: bool) -> dict[str, Content]:
-    contents: dict[str, Content] = {_("Joint angles"): "angles", _("Orientations"): "orientations"}
-    if hand:
-        return {**contents, _("Positions"): "positions"}
-    return {_("Orientations"): "orientations"}
 
 
 def _label(entry: Entry) -> str:

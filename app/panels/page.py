@@ -200,7 +200,7 @@ def _add_commands(gui: viser.GuiApi, send: Send, library: LibraryPanel) -> None:
     undo.on_trigger(_sending(send, intents.Undo()))
     to_bin = gui.add_command(_("Move the chosen take to the bin"), hotkey="delete")
     to_bin.on_trigger(lambda _event: library.bin())
-    export = gui.add_command(_("Export CSV of the open take"), hotkey="E")
+    export = gui.add_command(_("Export the open take"), hotkey="E")
     export.on_trigger(library.export)
     diagnostics = gui.add_command(_("Diagnostics"))
     diagnostics.on_trigger(lambda event: send(intents.SendDiagnostics(page_of(event))))

@@ -24,7 +24,7 @@ from handstudio.analysis.series import AngleSeries, series_of
 from handstudio.analysis.tremor import spectrum_of
 from handstudio.analysis.whole import tremor_angles
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window, cut
+from handstudio.export.part import Window, cut
 from handstudio.measure import Measured, Visit, measure
 from handstudio.pipeline import Motion
 from handstudio.process import process

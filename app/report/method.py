@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import msgspec
-
 from app.words import _
-from handstudio.export.metadata import metadata
+from handstudio.export.metadata import of_part, of_take
 from handstudio.hand.angles import ROOT_ANGLES
 from handstudio.kinematics import has_start
 from handstudio.pipeline import Motion
@@ -17,7 +15,8 @@ from handstudio.setup import NOMINAL_ZERO, Setup
 
 def method_of(take: Take, setup: Setup, motion: Motion) -> list[tuple[str, str]]:
     """Filter, convention, zero, rates, loss, software and the hash of the raw file."""
-    about: dict[str, Any] = msgspec.json.decode(metadata(take, setup, motion, "angles"))
+    start_us = int(motion.time_us[0])
+    about = {**of_take(take, setup), **of_part(setup, motion, start_us, "angles")}
     smooth = _("with the future taken in") if setup.smooth else _("as live, without the future")
     name = {"tree": _("one filter over the whole hand"), "vqf": "VQF"}
     tag = str(about["filter"]["type"])

@@ -8,7 +8,7 @@ from handstudio.analysis.take_grasps import TakenGrasp, grasps_in
 from handstudio.analysis.take_writing import can_tell_writing, writings_in
 from handstudio.commands.arguments import Json, TakeFile
 from handstudio.commands.calibration import chosen
-from handstudio.export.csv import Window, cut
+from handstudio.export.part import Window, cut
 from handstudio.process import aligned_setup
 from handstudio.process import process as process_take
 from handstudio.recording.take import open_take

@@ -13,7 +13,7 @@ from handstudio.analysis.tables import Group, GroupName, Row, grouped, judged, s
 from handstudio.commands import calibration as calibration_commands
 from handstudio.commands.arguments import Json, TakeFile
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window
+from handstudio.export.part import Window
 from handstudio.measure import Measured, band_of
 from handstudio.measure import measure as measure_take
 from handstudio.recording.take import open_take

@@ -10,8 +10,8 @@ from handstudio.analysis.writing import Writing
 from handstudio.commands.arguments import Json, TakeFile
 from handstudio.commands.calibration import chosen
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window, cut
-from handstudio.export.metadata import metadata
+from handstudio.export.metadata import of_part, of_take
+from handstudio.export.part import Window, cut
 from handstudio.export.trace import FORMATS, csv_sidecar, save, told
 from handstudio.pipeline import Motion
 from handstudio.process import aligned_setup
@@ -70,7 +70,9 @@ def trace(
     rows: list[dict[str, Any]] = []
     for number, writing in enumerate(found, start=1):
         name = f"{take.stem}.trace" + (f"-{number}" if len(found) > 1 else "")
-        files = _saved(writing, wanted, folder / name, (opened, setup, part))
+        files = _saved(
+            writing, wanted, folder / name, (opened, setup, part, int(motion.time_us[0]))
+        )
         rows.append(told(writing) | {"files": files})
     if json:
         print_json(rows)
@@ -80,14 +82,16 @@ def trace(
 
 
 def _saved(
-    writing: Writing, wanted: list[str], target: Path, of: tuple[Take, Setup, Motion]
+    writing: Writing, wanted: list[str], target: Path, of: tuple[Take, Setup, Motion, int]
 ) -> list[str]:
     files = []
     for name in wanted:
         path = target.with_name(f"{target.name}.{name}")
         files.append(str(save(path, FORMATS[name](writing))))
         if name == "csv":
-            sidecar = csv_sidecar(writing, metadata(*of, "trace"))
+            take, setup, part, start_us = of
+            about = of_take(take, setup) | of_part(setup, part, start_us, "trace")
+            sidecar = csv_sidecar(writing, about)
             save(path.with_name(f"{path.name}.json"), sidecar)
     return files
 

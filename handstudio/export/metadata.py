@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import Any
 
 import msgspec
 import numpy as np
 
 from handstudio import __version__
+from handstudio.arrays import Array
 from handstudio.health.record import TakeHealth, Trouble
 from handstudio.kinematics import has_start
-from handstudio.pipeline import Motion
+from handstudio.pipeline import Doubt, Motion
 from handstudio.recording.take import Take
 from handstudio.recording.take_health import health_of_take
 from handstudio.setup import Setup
@@ -21,14 +23,16 @@ CONVENTION = (
     "clinical signs after ISB; quaternions scalar first; world z up, x to magnetic north"
 )
 
+_JUMP = 1.5  # usual steps: a longer one means that instants are missing
+_MOST = 1000  # stretches that are listed
 
-def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
-    """The sidecar of an export, JSON."""
+
+def of_take(take: Take, setup: Setup) -> dict[str, Any]:
+    """What is the same for every window and format of a take."""
     header = take.header
     start = datetime.fromtimestamp(header.start_utc_ns * 1e-9, UTC)
     health = health_of_take(take)
-    fields: dict[str, Any] = {
-        "content": content,
+    return {
         "take": header.name,
         "subject": header.subject,
         "hand_side": setup.layout.side,
@@ -36,7 +40,6 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
         "device": msgspec.to_builtins(setup.device),
         "sensor_map": {place.sensor: place.segment for place in setup.layout.sensors},
         "nominal_rate_hz": setup.rate_hz,
-        "measured_rate_hz": _measured_rate(motion),
         "loss_percent": _loss_percent(take, health),
         "findings": [_told(trouble, setup) for trouble in health.troubles],
         "calibration": setup.calibration,
@@ -54,14 +57,55 @@ def metadata(take: Take, setup: Setup, motion: Motion, content: str) -> bytes:
         "raw_file": take.path.name,
         "raw_sha256": take.sha256(),
     }
-    if content == "angles" and has_start(motion):
+
+
+def of_part(setup: Setup, motion: Motion, start_us: int, content: str) -> dict[str, Any]:
+    """What is of one window: its times, its gaps, what is in doubt where.
+
+    Args:
+        setup: What the motion was computed by.
+        motion: The instants of the window, at least one.
+        start_us: The take's first instant, from which seconds count.
+        content: What of the motion is written.
+    """
+    time_s = _seconds(motion.time_us - start_us)
+    fields: dict[str, Any] = {
+        "content": content,
+        "window_s": [time_s[0], time_s[-1]],
+        "instants": len(motion),
+        "measured_rate_hz": _measured_rate(motion),
+        "missing": missing(setup, motion),
+        "gaps_s": _gaps(motion, time_s),
+        "doubtful_s": _doubtful(setup, motion, time_s),
+    }
+    if content in ("angles", "motion") and has_start(motion):
         fields["elbow_flexion and forearm_pronation"] = (
             "relative to the forearm's attitude at the start (palm down), the upper arm assumed "
             "still: no sensor is on it"
         )
-    if content == "positions":
+    if content in ("positions", "skeleton", "motion") and setup.layout.is_hand:
         fields["origin"] = "the elbow, assumed still: its place cannot be observed"
-    return msgspec.json.format(msgspec.json.encode(fields))
+    return fields
+
+
+def missing(setup: Setup, motion: Motion) -> list[str]:
+    """What a reader might look for and not find, in English sentences; also why."""
+    told = []
+    if not setup.layout.is_hand:
+        told.append(setup.layout.missing_for_hand)
+    elif setup.subject is None:
+        told.append(
+            "No calibration of the wearer: sensors are taken to sit squarely on their segments, "
+            "the hand to have mean proportions."
+        )
+    if setup.layout.is_hand and not has_start(motion):
+        told.append(
+            "No rest from which elbow_flexion and forearm_pronation could count: they are absent."
+        )
+    if gaps := _gaps(motion, _seconds(motion.time_us - motion.time_us[:1])):
+        gone = sum(end - begin for begin, end in gaps)
+        told.append(f"{len(gaps)} gaps, {gone:.2f} s in all: nothing is filled in for them.")
+    return told
 
 
 def _subject_made(setup: Setup) -> dict[str, Any] | None:
@@ -154,6 +198,40 @@ def _told(trouble: Trouble, setup: Setup) -> dict[str, Any]:
         "worst": round(trouble.worst, 3),
         "unit": trouble.unit,
     }
+
+
+def _seconds(time_us: Array) -> list[float]:
+    return [float(each) for each in np.round(time_us * 1e-6, 6)]
+
+
+def _gaps(motion: Motion, time_s: list[float]) -> list[list[float]]:
+    """The last instant before and the first after each stretch that is missing."""
+    if len(motion) < 2:
+        return []
+    steps = np.diff(motion.time_us)
+    after = np.flatnonzero(steps > _JUMP * np.median(steps)) + 1
+    return [[time_s[k - 1], time_s[k]] for k in after[:_MOST]]
+
+
+def _doubtful(setup: Setup, motion: Motion, time_s: list[float]) -> dict[str, Any]:
+    """First and last instant of each stretch in which a sensor is in doubt, and why."""
+    told: dict[str, Any] = {}
+    for sensor, name in enumerate(setup.layout.names):
+        doubt = np.asarray(motion.doubt[:, sensor])
+        edges = np.flatnonzero(np.diff(doubt)) + 1
+        bounds = [0, *edges.tolist(), len(doubt)]
+        stretches = [
+            [time_s[begin], time_s[end - 1], _why(int(doubt[begin]))]
+            for begin, end in pairwise(bounds)
+            if doubt[begin]
+        ]
+        if stretches:
+            told[name] = stretches[:_MOST]
+    return told
+
+
+def _why(doubt: int) -> str:
+    return ", ".join(flag.name.lower() for flag in Doubt if flag in Doubt(doubt) and flag.name)
 
 
 def _measured_rate(motion: Motion) -> float | None:

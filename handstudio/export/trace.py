@@ -105,9 +105,9 @@ PAGE = "x to the right, y up the page, from the middle of what is written; tip f
 """What the columns of the CSV mean beside their names."""
 
 
-def csv_sidecar(writing: Writing, fields: bytes) -> bytes:
+def csv_sidecar(writing: Writing, about: dict[str, Any]) -> bytes:
     """The metadata of an export with what there is to say of the writing."""
-    known = msgspec.json.decode(fields) | {"page": PAGE, "writing": told(writing)}
+    known = about | {"page": PAGE, "writing": told(writing)}
     return msgspec.json.format(msgspec.json.encode(known))
 
 

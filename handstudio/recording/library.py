@@ -20,6 +20,7 @@ from handstudio.recording.moves import settle
 from handstudio.recording.naming import (
     TAKE,
     UNFINISHED,
+    VIEW,
     file_name,
     free_path,
     is_unfinished,
@@ -129,6 +130,7 @@ def take_files(sessions: Path) -> list[Path]:
         for visit in folders(subject)
         for file in _scan(visit)
         if file.name.endswith((TAKE, TAKE + UNFINISHED)) and not file.name.startswith(".")
+        if not file.name.endswith(VIEW)
     ]
 
 

@@ -13,6 +13,9 @@ UNFINISHED = ".recording"
 
 TAKE = ".mcap"
 
+VIEW = "~motion.mcap"
+"""What an export that viewers open ends in: it is no take, and none can be called so."""
+
 LONGEST = 80, 180
 """Characters, and bytes in UTF-8, of a name: with what is added to it a file system takes 255."""
 

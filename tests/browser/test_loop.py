@@ -50,6 +50,14 @@ def test_a_take_is_recorded_replayed_and_exported(
     downloaded = Path(waiting.value.path()).read_bytes()
     assert_same_as_the_shell_computes(studio, take, downloaded, tmp_path / "alone")
 
+    page.get_by_role("combobox", name="Format").click()
+    page.get_by_role("option", name="C3D (positions)").click()
+    expect(page.get_by_role("combobox", name="Contents")).to_be_hidden()
+    with page.expect_download() as waiting:
+        button(page, "Export C3D").click()
+    assert waiting.value.suggested_filename == f"{take.stem}.c3d"
+    assert Path(waiting.value.path()).read_bytes() == take.with_suffix(".c3d").read_bytes()
+
 
 def assert_same_as_the_shell_computes(
     studio: RunningStudio, take: Path, downloaded: bytes, alone: Path

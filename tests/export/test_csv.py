@@ -17,57 +17,28 @@ from handstudio import __version__
 from handstudio.calibration.device import UNITY, DeviceCalibration, Residuals, SensorErrors, Source
 from handstudio.calibration.subject import Centre, SubjectCalibration
 from handstudio.errors import TakeError
-from handstudio.export import csv as csv_module
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export import part as part_module
+from handstudio.export import tables as tables_module
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Content, Processed, Window
 from handstudio.hand.angles import ROOT_ANGLES
-from handstudio.hand.skeleton import FINGERS, JOINTS
+from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS
 from handstudio.health.record import Episode
-from handstudio.kinematics import angles_of, measured_angles, pose_of, relative_rotations
-from handstudio.layout import JointPlace, Layout, SensorPlace
-from handstudio.pipeline import Motion, unsure
-from handstudio.process import process
-from handstudio.recording.header import Header, Summary
-from handstudio.recording.simulated import rehearse, simulate
+from handstudio.kinematics import (
+    angles_of,
+    measured_angles,
+    pose_of,
+    relative_rotations,
+    segment_attitudes,
+)
+from handstudio.pipeline import Motion
+from handstudio.recording.header import Summary
 from handstudio.recording.take import Take, open_take
 from handstudio.recording.writer import TakeWriter
-from handstudio.setup import HandModel, Setup, calibrated
+from handstudio.setup import Setup, calibrated
 
-CONTENTS: tuple[Content, ...] = ("angles", "orientations", "positions")
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Take:
-    """Six seconds of a left virtual glove: rest, then the forearm raised and a fist begun."""
-    folder = tmp_path_factory.mktemp("recorded")
-    hand = HandModel(hand_length_m=0.175)
-    return open_take(
-        simulate(
-            folder,
-            rehearse(seed=1, side="left", hand_length_m=hand.hand_length_m),
-            seconds=6.0,
-            health=True,
-        )
-    )
-
-
-@pytest.fixture(scope="module")
-def motion(recorded) -> Motion:
-    return process(recorded)
-
-
-@pytest.fixture
-def door(tmp_path) -> tuple[Take, Motion]:
-    """A take without a hand: two sensors of a door, one joint; the motion is made up."""
-    places = (SensorPlace("leaf, inner", "door"), SensorPlace("frame", "wall"))
-    layout = Layout("unknown", places, (JointPlace("hinge", "wall", "door", 1),))
-    header = Header("door", "S01", 10**18, Setup(layout, 50.0), "samples", "by hand")
-    take = open_take(TakeWriter(tmp_path / "door.mcap", header).close())
-    rng = np.random.default_rng(2)
-    q = rng.normal(size=(5, 2, 4))
-    q /= np.linalg.norm(q, axis=-1, keepdims=True)
-    doubt = np.array([[0, 0], [1, 0], [3, 8], [0, 4], [0, 0]], dtype=np.uint8)
-    time_us = np.array([5_000_000, 5_020_000, 5_040_001, 5_100_000, 5_120_000])
-    return take, Motion(time_us, q, np.full((5, 4), np.nan), doubt, unsure(doubt))
+CONTENTS: tuple[Content, ...] = ("angles", "orientations", "segments", "positions")
 
 
 def read(path: Path) -> tuple[list[str], np.ndarray]:
@@ -75,6 +46,19 @@ def read(path: Path) -> tuple[list[str], np.ndarray]:
     with path.open(newline="", encoding="utf-8") as file:
         names, *rows = list(csv.reader(file))
     return names, np.array([[float(cell) for cell in row] for row in rows])
+
+
+def export_csv(
+    take: Take,
+    setup: Setup,
+    motion: Motion,
+    target: Path,
+    *,
+    content: Content = "angles",
+    window: Window | None = None,
+) -> Path:
+    source = Processed(take, setup, motion)
+    return export(source, target, FORMATS["csv"], content=content, window=window)
 
 
 def exported(
@@ -122,6 +106,13 @@ def test_orientations_are_those_of_the_sensors_and_across_the_joints(recorded, m
     np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-7)
 
 
+def test_segments_are_those_of_the_hand_in_the_world(recorded, motion, tmp_path):
+    names, values = exported(recorded, motion, tmp_path, "segments")
+    assert names == ["time_s", *(f"{s}_q{p}" for s in SEGMENTS for p in "wxyz"), "doubtful_sensors"]
+    expected = segment_attitudes(recorded.header.setup, motion.q_world_sensor)
+    np.testing.assert_allclose(values[:, 1:-1], expected.reshape(len(motion), -1), atol=0.50001e-7)
+
+
 def test_positions_are_those_of_joints_and_fingertips_in_millimetres(recorded, motion, tmp_path):
     names, values = exported(recorded, motion, tmp_path, "positions")
     points = [*(joint.name for joint in JOINTS), *(f"{finger}_tip" for finger in FINGERS)]
@@ -152,7 +143,7 @@ def test_how_many_rows_are_written_at_a_time_changes_no_byte(
 ):
     exported(recorded, motion, tmp_path, content)
     whole = (tmp_path / "out.csv").read_bytes()
-    monkeypatch.setattr(csv_module, "_BLOCK", 97)
+    monkeypatch.setattr(part_module, "BLOCK", 97)
     exported(recorded, motion, tmp_path, content)
     assert (tmp_path / "out.csv").read_bytes() == whole
     assert b"-0," not in whole
@@ -224,7 +215,7 @@ def test_a_take_without_a_hand_gives_orientations(door, tmp_path):
     np.testing.assert_allclose(values[:, 9:13], across, atol=0.50001e-7)
 
 
-@pytest.mark.parametrize("content", ["angles", "positions"])
+@pytest.mark.parametrize("content", ["angles", "positions", "segments"])
 def test_a_take_without_a_hand_has_no_angles_and_leaves_no_file(door, tmp_path, content):
     with pytest.raises(TakeError, match=r"no joint angles.*which hand.*\n.*orientations instead"):
         exported(*door, tmp_path, content)
@@ -377,7 +368,7 @@ def test_a_file_that_cannot_be_written_is_named_and_the_one_before_stays(
 ):
     exported(recorded, motion, tmp_path)
     before = (tmp_path / "out.csv").read_bytes()
-    monkeypatch.setattr(csv_module, "metadata", _full)
+    monkeypatch.setattr(tables_module.Table, "rounded", _full)
     with pytest.raises(TakeError, match=r"out\.csv: cannot be written.*\n.*another folder"):
         exported(recorded, motion, tmp_path, "positions")
     assert (tmp_path / "out.csv").read_bytes() == before
@@ -387,5 +378,5 @@ def test_a_file_that_cannot_be_written_is_named_and_the_one_before_stays(
         export_csv(recorded, recorded.header.setup, motion, tmp_path / "file" / "out.csv")
 
 
-def _full(*_: object) -> bytes:
+def _full(*_: object) -> np.ndarray:
     raise OSError(28, "No space left on device")

@@ -22,7 +22,9 @@ from handstudio.analysis.stretches import Stretch
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
 from handstudio.device.recorder import Recorder
-from handstudio.export.csv import Content, Window, export_csv
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Content, Processed, Window
 from handstudio.measure import Measured, measure
 from handstudio.pipeline import Motion
 from handstudio.process import process
@@ -98,12 +100,18 @@ class PromptJobs:
         return done(lambda: trim(open_take(path), begin_s, end_s, name=name))
 
     def export(
-        self, path: Path, target: Path, content: Content, window: Window, setup: Setup | None = None
+        self,
+        path: Path,
+        name: str,
+        content: Content | None,
+        window: Window,
+        setup: Setup | None = None,
     ) -> Future[Path]:
-        take = open_take(path)
+        take, chosen = open_take(path), FORMATS[name]
         setup = setup or take.header.setup
-        motion = process(take, setup)
-        return done(lambda: export_csv(take, setup, motion, target, content=content, window=window))
+        source = Processed(take, setup, process(take, setup))
+        target = chosen.target(path, chosen.content(content, setup.layout))
+        return done(lambda: export(source, target, chosen, content=content, window=window))
 
     def measure(
         self, path: Path, window: Window, setup: Setup | None, earlier: Path | None

@@ -10,8 +10,11 @@ import pytest
 from app import intents
 from app.studio import Studio
 from app.views import page as view
+from app.views.formats import contents, offered
 from handstudio.device.orders import Ask, Connect, Newest, Phase, TakeDone
 from handstudio.errors import DeviceError
+from handstudio.export.formats import FORMATS
+from handstudio.layout import Layout, SensorPlace, glove
 from handstudio.process import process
 from handstudio.recording.simulated import simulate
 from handstudio.recording.take import Take
@@ -41,6 +44,29 @@ def test_export_writes_the_file_and_sends_it_to_the_page_that_asked(studio: Stud
     state = after(studio, intents.Export("angles", page=5))
     assert [download.page for download in state.downloads] == [5]
     assert state.downloads[0].content.read_bytes().startswith(b'"time_s"')
+
+
+def test_every_format_is_written_beside_the_take_and_sent(studio: Studio) -> None:
+    path = simulate(studio.state.sessions, seconds=3.0)
+    after(studio, intents.OpenTake(path))
+    for name in ("glb", "mcap"):
+        state = after(studio, intents.Export(None, page=5, format=name))
+        (download,) = state.downloads
+        assert download.content.parent == path.parent
+        assert download.name.endswith(f".{name}")
+        assert download.content.with_name(download.name + ".json").exists()
+    studio.refresh_takes()
+    assert [entry.path for entry in studio.state.shelf.takes] == [path]
+
+
+def test_what_cannot_become_a_format_is_not_offered() -> None:
+    hand, door = glove("left"), Layout("unknown", (SensorPlace("SN1", "leaf"),), ())
+    assert [each.name for each in offered(hand).values()] == list(FORMATS)
+    assert [each.name for each in offered(door).values()] == ["csv", "parquet", "sto", "mcap"]
+    table = FORMATS["csv"]
+    assert list(contents(table, hand).values()) == list(table.contents)
+    assert list(contents(table, door).values()) == ["orientations"]
+    assert contents(FORMATS["c3d"], hand) == {}
 
 
 def test_export_holds_exactly_the_part_that_counts(studio: Studio) -> None:
