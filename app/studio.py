@@ -17,7 +17,6 @@ from app import comparison, diagnostics, intents, shaken, words
 from app import live as live_history
 from app import review as reviewing
 from app.calibrating import Calibrator
-from app.channels import OVERVIEW, SIGNALS, sets_of
 from app.filtering import Chooser, Prepared
 from app.holding import Holder
 from app.jobs import Jobs, Stopped
@@ -25,7 +24,7 @@ from app.keeping import Keeper
 from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
 from app.review import Review
-from app.seen import Choice
+from app.reviewer import Reviewer
 from app.solving import Answer
 from app.sounds import Sound
 from app.state import Download, Message, State
@@ -65,8 +64,6 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
-from handstudio.pipeline import Motion
-from handstudio.process import kept_motion
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
 from handstudio.recording import notes as noting
@@ -74,8 +71,6 @@ from handstudio.recording.recovery import recover
 from handstudio.recording.take import Take, open_take
 from handstudio.settings import SettingsStore
 from handstudio.setup import HandModel, Setup
-from handstudio.signals import kept_signals
-from handstudio.survey import kept_survey
 from handstudio.wizards.course import Next, Redo
 
 _BLINK_MS = 3000
@@ -102,9 +97,9 @@ class Studio:
         self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
+        self._reviewer = Reviewer(self._workshop)
         self._now_s = 0.0
         self._solving = False  # a calibration was ordered
-        self._sensor = ""  # whose signals are plotted
         self._toggled_s = self._guided_s = -1.0
         self._change()
         kept = [view for view in LASTING if view.value == self.store.settings.camera]
@@ -311,7 +306,7 @@ class Studio:
             case intents.SetFilter(name=name):
                 change(filter=name)
             case intents.ChooseCurves(name=name, sensor=sensor):
-                self._sensor = sensor or self._sensor
+                self._reviewer.sensor = sensor or self._reviewer.sensor
                 change(curves=name)
                 self._ask_of_review()
             case intents.SetTheme(dark=dark):
@@ -532,80 +527,23 @@ class Studio:
         self._open(recovered.path)
 
     def _open(self, path: Path) -> None:
-        take = open_take(path)
-        motion = kept_motion(take)
-        if motion is not None:
-            self._show(reviewing.opened(take, motion))
-            return
-        self._workshop.compute(take)
-        if self._chooser.serves(take.header.setup.filter):
-            self._workshop.preview(take)
+        preview = self._chooser.serves(open_take(path).header.setup.filter)
+        review = self._reviewer.opened(path, preview=preview)
+        if review is not None:
+            self._show(review)
 
     def _ask_of_review(self, **asked: Any) -> None:
         if self.state.review is not None:
             self._bring(replace(self.state.review, **asked))
 
     def _bring(self, review: Review) -> None:
-        """Show the motions that are asked for, as far as they are there; others are ordered."""
-        own = review.take.header.setup
-        wanted = comparison.setup_of(comparison.SMOOTHED, own) if review.smooth else own
-        if wanted != review.setup:
-            motion = self._motion_by(review.take, wanted)
-            if motion is not None:
-                review = reviewing.computed_by(review, wanted, motion)
-        if not review.compare:
-            review = replace(review, comparison=None)
-        elif review.comparison is None or review.comparison.name != review.compare:
-            review = self._beside(review)
-        self.state = replace(self.state, review=self._looked_through(review))
-
-    def _beside(self, review: Review) -> Review:
-        """With the motion that is compared with, where it is there; else it is ordered."""
-        if review.compare.startswith(comparison.OF_TAKE):
-            other = open_take(Path(review.compare.removeprefix(comparison.OF_TAKE)))
-            setup, name = other.header.setup, other.path.stem
-        else:
-            other, name = review.take, ""
-            setup = comparison.setup_of(review.compare, other.header.setup)
-        motion = self._motion_by(other, setup)
-        if motion is None:
-            return review
-        return reviewing.compared_with(review, setup, motion, name)
-
-    def _looked_through(self, review: Review) -> Review:
-        """With the curves that are chosen, and what is known of the stretches of the motion."""
-        layout, wanted = review.setup.layout, self.store.settings.curves
-        chosen = wanted if wanted in sets_of(layout) else OVERVIEW
-        sensor = layout.names.index(self._sensor) if self._sensor in layout.names else 0
-        signals, stretches = review.signals, review.stretches
-        if not review.partial:  # else all of it is on its way, and these afterwards
-            if chosen == SIGNALS and signals is None:
-                signals = kept_signals(review.take)
-            if stretches is None:
-                stretches = kept_survey(review.take, review.setup)
-            self._order(review, chosen == SIGNALS and signals is None, stretches is None)
-            if review.found is None and "found" not in review.ordered:
-                self._workshop.find(review.take, review.setup)
-        ordered = review.ordered if review.partial else review.ordered | {"found"}
-        if not review.partial:
-            ordered |= {"stretches", "signals"} if chosen == SIGNALS else {"stretches"}
-        choice = Choice(chosen, sensor)
-        return reviewing.seen_anew(
-            replace(review, choice=choice, signals=signals, stretches=stretches, ordered=ordered)
-        )
-
-    def _order(self, review: Review, signals: bool, stretches: bool) -> None:
-        """What of these is lacking and not on its way."""
-        if signals and "signals" not in review.ordered:
-            self._workshop.write_signals(review.take)
-        if stretches and "stretches" not in review.ordered:
-            self._workshop.look_through(review.take, review.used)
-
-    def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
-        motion = kept_motion(take, setup)
-        if motion is None:
-            self._workshop.compute_by(take, setup)
-        return motion
+        self._reviewer.curves = self.store.settings.curves
+        try:
+            review = self._reviewer.brought(review)
+        except HandstudioError as error:  # what it is compared with is gone
+            self._say(error)
+            review = self._reviewer.brought(reviewing.settled(review))
+        self.state = replace(self.state, review=review)
 
     def _show(self, review: Review) -> None:
         notes = noting.Notes()
@@ -734,8 +672,10 @@ class Studio:
                     self._look_at(setup or take.header.setup, found)
                 case Written(take=take) if self._is_open(take):
                     self._ask_of_review()
-                case Previewed(take=take, motion=motion) if self.state.review is None:
-                    self._show_head(take, motion)
+                case Previewed(take=take, motion=motion):
+                    review = self._reviewer.head(take, motion)
+                    if review is not None:
+                        self._show(review)
                 case Added(path=path):
                     self._tell(_("Added {name}.").format(name=path.stem))
                     self.refresh_takes()
@@ -793,28 +733,23 @@ class Studio:
         return review is not None and review.compare == f"{comparison.OF_TAKE}{take.path}"
 
     def _show_computed(self, take: Take) -> None:
-        motion = kept_motion(take)
-        review = self.state.review if self._is_open(take) else None
+        before = self.state.review
         try:
-            if motion is None:
-                return
-            if review is None:
-                self._show(reviewing.opened(take, motion))
-            elif review.partial:
-                self._bring(reviewing.computed_by(review, take.header.setup, motion))
-            else:
-                self._bring(review)
+            review = self._reviewer.computed(take, before)
         except HandstudioError as error:
             self._say(error)
+            return
+        if review is None:
+            return
+        if before is not None and before.take.path == take.path:
+            self._bring(review)
+        else:
+            self._show(review)
 
     def _look_at(self, setup: Setup, found: tuple[Stretch, ...]) -> None:
         review = self.state.review
         if review is not None and review.setup == setup:
             self.state = replace(self.state, review=replace(review, stretches=found))
-
-    def _show_head(self, take: Take, motion: Motion) -> None:
-        if len(motion) > 0:
-            self._show(replace(reviewing.opened(take, motion), partial=True))
 
     def _face_once(self) -> None:
         """Choose the turn of the picture when there is a first pose to choose it by."""

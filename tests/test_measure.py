@@ -10,7 +10,7 @@ import pytest
 
 from handstudio.analysis.measure import Measure
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window
+from handstudio.export.part import Window
 from handstudio.kinematics import angles_of
 from handstudio.layout import Layout, SensorPlace
 from handstudio.measure import Measured, band_of, measure

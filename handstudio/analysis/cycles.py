@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int64
-from scipy.signal import find_peaks
 
 from handstudio.analysis.measure import Measure, missing
 from handstudio.analysis.series import AngleSeries
@@ -71,6 +70,8 @@ def cycles_of(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Cycles:
 
 def turning_points(values: Float[Array, " n"], least: float) -> Int64[Array, " t"]:
     """Troughs and peaks in turn, each at least ``least`` from the one before; ends count too."""
+    from scipy.signal import find_peaks  # noqa: PLC0415 - takes a second to load
+
     padded = np.concatenate([[values[0]], values, [values[-1]]])
     found: list[tuple[int, float]] = []
     for sign in (1.0, -1.0):

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import median_filter
 
 from handstudio.analysis.unbroken import rate_of, unbroken
 from handstudio.arrays import Array
@@ -37,6 +36,8 @@ def extremes(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Extremes
 
 def running_median(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Float[Array, " n"]:
     """Median over `HELD_S` around every instant of an unbroken stretch; NaN elsewhere."""
+    from scipy.ndimage import median_filter  # noqa: PLC0415 - takes a second to load
+
     out = np.full(len(values), np.nan)
     if len(time_s) < 2:
         return out

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import gaussian_filter1d
 
 from handstudio.analysis.grasp_prototypes import ANGLES, OPEN, PROTOTYPES, SD_DEG
 from handstudio.arrays import Array
@@ -115,6 +114,8 @@ def grasp_segments(
 
 
 def _still(time_s: Array, postures: Array) -> Bool[Array, " n"]:
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415 - takes a second to load
+
     step_s = float(np.median(np.diff(time_s)))
     smooth = gaussian_filter1d(postures, _SMOOTHED_S / step_s, axis=0, mode="nearest")
     rate = np.gradient(smooth, time_s, axis=0)[:, np.isfinite(postures).all(axis=0)]

@@ -13,7 +13,6 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares
 
 from handstudio.arrays import Array
 from handstudio.hand.flesh import half_depths
@@ -111,6 +110,7 @@ def object_size(
 
 def sphere_held(bones: Bones) -> tuple[float, float]:
     """Radius of the sphere in a hand, palm towards -z, and what is left [m]."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - takes a second to load
 
     def gaps(x: Array) -> Array:
         off: Array = _to_bone(x[:3], bones) - bones.flesh - x[3]
@@ -123,6 +123,8 @@ def sphere_held(bones: Bones) -> tuple[float, float]:
 
 def cylinder_held(bones: Bones) -> tuple[float, float]:
     """Radius of the bar across the palm (along x, more or less), and what is left [m]."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - takes a second to load
+
     middle = bones.start.mean(axis=0)
 
     def gaps(x: Array) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import gaussian_filter1d, label
 
 from handstudio.arrays import Array
 
@@ -31,6 +30,8 @@ def pen_down(
         along: Its place on the paper [m].
         step_s: Between instants.
     """
+    from scipy.ndimage import gaussian_filter1d, label  # noqa: PLC0415
+
     steady = gaussian_filter1d(height_m - _drift(height_m, step_s), _SMOOTHED_S / step_s)
     near = np.abs(steady[np.abs(steady) < _LIFTED_M])
     noise = 1.4826 * float(np.median(near)) if len(near) else 0.0
@@ -51,6 +52,8 @@ def strokes(down: Bool[Array, " n"]) -> list[slice]:
 
 def _drift(height: Array, step_s: float) -> Array:
     """Height of the paper as it wanders, from what is near it."""
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415 - takes a second to load
+
     wide = _DRIFT_S / step_s
     near = 1.0 / (1.0 + (height / _ON_PAPER_M) ** 2) ** 2
     weight = gaussian_filter1d(near, wide)

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.optimize import least_squares
 
 from handstudio.arrays import Array
 from handstudio.hand.flesh import half_depths, outwards
@@ -114,6 +112,8 @@ def held(hand: PenHand) -> list[tuple[int, int]]:
 
     Each as its first instant and the one after its last.
     """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415
+
     if len(hand.time_s) < 2:
         return []
     step_s = float(np.median(np.diff(hand.time_s)))
@@ -128,6 +128,8 @@ def held(hand: PenHand) -> list[tuple[int, int]]:
 
 def pen_motion(hand: PenHand) -> PenMotion:
     """How the pen moves that is held throughout."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - takes a second to load
+
     few = hand.part(slice(None, None, max(1, len(hand.time_s) // _FITTED)))
     count = len(few.time_s)
     scale = 1.0 / (_RIGID_SD_M * max(1.0, count / _COUNTED) ** 0.5)

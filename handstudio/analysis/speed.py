@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import savgol_filter
 
 from handstudio.analysis.extremes import extremes
 from handstudio.analysis.measure import Measure, WhyNot, missing
@@ -25,6 +24,8 @@ NOISE_DEG_S = 2.0
 
 def velocity(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Float[Array, " n"]:
     """Slope of a local cubic [1/s]; NaN where its window would reach over the end of a stretch."""
+    from scipy.signal import savgol_filter  # noqa: PLC0415 - takes a second to load
+
     out = np.full(len(values), np.nan)
     if len(time_s) < 2:
         return out

@@ -11,9 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import uniform_filter1d
-from scipy.signal import detrend, periodogram
-from scipy.stats import chi2
 
 from handstudio.analysis.measure import Measure, WhyNot, missing
 from handstudio.analysis.series import AngleSeries
@@ -68,6 +65,8 @@ class Spectrum:
 
         Windows that overlap by half count for about 0.65 each.
         """
+        from scipy.stats import chi2  # noqa: PLC0415 - takes a second to load
+
         freedom = 2.0 * max(1.0, 0.65 * self.windows)
         return float(chi2.ppf(1.0 - CHANCE / bins, freedom) / chi2.median(freedom))
 
@@ -80,6 +79,8 @@ class Spectrum:
 
 def spectrum_of(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Spectrum | None:
     """Mean spectrum over the windows in which the joint was held; None where none is that long."""
+    from scipy.signal import periodogram  # noqa: PLC0415 - takes a second to load
+
     if len(time_s) < 2:
         return None
     rate = rate_of(time_s)
@@ -102,12 +103,16 @@ def spectrum_of(time_s: Float[Array, " n"], values: Float[Array, " n"]) -> Spect
 
 def _level(windows: Array) -> Array:
     """Windows without their trends."""
+    from scipy.signal import detrend  # noqa: PLC0415 - takes a second to load
+
     out: Array = detrend(windows, axis=-1)
     return out
 
 
 def _is_held(window: Array, rate: float) -> bool:
     """Whether nothing moved in it but what is faster than the band begins."""
+    from scipy.ndimage import uniform_filter1d  # noqa: PLC0415 - takes a second to load
+
     slow = uniform_filter1d(window, max(1, round(rate / BAND_HZ[0])), mode="nearest")
     return bool(np.ptp(slow) <= HELD_RAD)
 

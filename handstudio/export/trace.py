@@ -9,8 +9,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
@@ -66,6 +64,9 @@ def trace_png(writing: Writing, dpi: float = _DPI) -> bytes:
 
 def trace_csv(writing: Writing) -> bytes:
     """Every instant from taking the pen to laying it down; stroke 0: it does not write."""
+    import pyarrow as pa  # noqa: PLC0415 - takes a while to load
+    import pyarrow.csv  # noqa: PLC0415
+
     number = np.zeros(len(writing.time_s))
     for count, stroke in enumerate(writing.strokes, start=1):
         number[stroke] = count

@@ -9,7 +9,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,6 +103,16 @@ class NoJobs:
     """Nothing has to be computed: the motion of a take is there when it is whole."""
 
     share_done = 0.0
+
+    def survey(self, path: Path, setup: object = None) -> Future[tuple[()]]:
+        return _never()
+
+    def find(self, path: Path, setup: object) -> Future[None]:
+        return _never()
+
+
+def _never() -> Future[Any]:
+    return Future()
 
 
 class Desk:

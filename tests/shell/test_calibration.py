@@ -100,7 +100,7 @@ def found(monkeypatch):
 
     def set_to(verdicts=(GOOD,), to_repeat=(), calibration=None):
         result = Calibrated(calibration or hand(), tuple(verdicts), tuple(to_repeat))
-        monkeypatch.setattr(commands, "calibrate_takes", lambda takes, progress: result)
+        monkeypatch.setattr(commands, "calibrate_takes", lambda takes, progress, hand_type: result)
 
     return set_to
 
@@ -201,7 +201,7 @@ def test_it_is_told_for_programs_and_kept_for_another_subject(here, found, take,
 
 
 def test_what_cannot_be_calibrated_says_why(here, monkeypatch, take, sessions):
-    def refuse(takes, progress):
+    def refuse(takes, progress, hand_type):
         raise CalibrationError("Nothing swings in {count} takes.", "Record them.", count=len(takes))
 
     monkeypatch.setattr(commands, "calibrate_takes", refuse)

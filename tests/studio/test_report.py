@@ -22,7 +22,7 @@ from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import Axis, Centre, Segment, SubjectCalibration, Tip
 from handstudio.calibration.verdict import Reading, Verdict
 from handstudio.errors import TakeError
-from handstudio.export.csv import Window
+from handstudio.export.part import Window
 from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS, nominal_skeleton
 from handstudio.kinematics import pose_of
 from handstudio.layout import Layout, SensorPlace

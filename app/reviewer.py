@@ -1,0 +1,144 @@
+"""The take that is open: what is shown of it as far as it is there, the rest ordered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from app import comparison
+from app import review as reviewing
+from app.channels import OVERVIEW, SIGNALS, sets_of
+from app.review import Review
+from app.seen import Choice
+from app.workshop import Workshop
+from handstudio.pipeline import Motion
+from handstudio.process import kept_motion
+from handstudio.recording.take import Take, open_take
+from handstudio.setup import Setup
+from handstudio.signals import kept_signals
+from handstudio.survey import kept_survey
+
+
+@dataclass
+class Reviewer:
+    """Makes reviews, and orders of the workshop what they lack; for one thread.
+
+    Attributes:
+        workshop: Where long work is ordered.
+        curves: Name of the set of curves that is wanted.
+        sensor: Name of the one whose signals are.
+        opening: The take that was asked for and is not there yet.
+    """
+
+    workshop: Workshop
+    curves: str = OVERVIEW
+    sensor: str = ""
+    opening: Path | None = None
+
+    def opened(self, path: Path, *, preview: bool) -> Review | None:
+        """A take at its beginning; None: it is computed first, ``preview``: its first seconds now.
+
+        Raises:
+            TakeError: it cannot be opened, or nothing moves in it.
+        """
+        take = open_take(path)
+        motion = kept_motion(take)
+        if motion is not None:
+            self.opening = None
+            return reviewing.opened(take, motion)
+        self.opening = path
+        self.workshop.compute(take)
+        if preview:
+            self.workshop.preview(take)
+        return None
+
+    def head(self, take: Take, motion: Motion) -> Review | None:
+        """The first seconds, where they are still waited for."""
+        if take.path != self.opening or len(motion) == 0 or kept_motion(take) is not None:
+            return None
+        return replace(reviewing.opened(take, motion), partial=True)
+
+    def computed(self, take: Take, review: Review | None) -> Review | None:
+        """All of a take that was computed, in the place of what was shown of it; None: not wanted.
+
+        Raises:
+            TakeError: nothing moves in it.
+        """
+        motion, wanted = kept_motion(take), take.path == self.opening
+        here = review is not None and review.take.path == take.path
+        if motion is None or not (wanted or here):
+            return None
+        self.opening = None if wanted else self.opening
+        if review is None or not here:
+            return reviewing.opened(take, motion)
+        if review.partial:
+            return reviewing.computed_by(review, take.header.setup, motion)
+        return review
+
+    def brought(self, review: Review) -> Review:
+        """With the motions that are asked for, as far as they are there; others are ordered.
+
+        Raises:
+            HandstudioError: the take to compare with cannot be opened.
+        """
+        own = review.take.header.setup
+        wanted = comparison.setup_of(comparison.SMOOTHED, own) if review.smooth else own
+        if wanted != review.setup:
+            motion = self._motion_by(review.take, wanted)
+            if motion is not None:
+                review = reviewing.computed_by(review, wanted, motion)
+        if not review.compare:
+            review = replace(review, comparison=None)
+        elif review.comparison is None or review.comparison.name != review.compare:
+            review = self._beside(review)
+        return self._looked_through(review)
+
+    def _beside(self, review: Review) -> Review:
+        """With the motion that is compared with, where it is there; else it is ordered."""
+        if review.compare.startswith(comparison.OF_TAKE):
+            other = open_take(Path(review.compare.removeprefix(comparison.OF_TAKE)))
+            setup, name = other.header.setup, other.path.stem
+        else:
+            other, name = review.take, ""
+            setup = comparison.setup_of(review.compare, other.header.setup)
+        motion = self._motion_by(other, setup)
+        if motion is None:
+            return review
+        return reviewing.compared_with(review, setup, motion, name)
+
+    def _looked_through(self, review: Review) -> Review:
+        """With the curves that are chosen, and what is known of the motion."""
+        layout = review.setup.layout
+        chosen = self.curves if self.curves in sets_of(layout) else OVERVIEW
+        sensor = layout.names.index(self.sensor) if self.sensor in layout.names else 0
+        review = replace(review, choice=Choice(chosen, sensor))
+        if not review.partial:  # else all of it is on its way, and these afterwards
+            review = self._ordered(review)
+        return reviewing.seen_anew(review)
+
+    def _ordered(self, review: Review) -> Review:
+        """With what is kept of signals, stretches and finds; what is not is ordered, once."""
+        take, signals, stretches = review.take, review.signals, review.stretches
+        if review.choice.name == SIGNALS and signals is None:
+            signals = kept_signals(take)
+        if stretches is None:
+            stretches = kept_survey(take, review.setup)
+        lacking = {
+            "signals": review.choice.name == SIGNALS and signals is None,
+            "stretches": stretches is None,
+            "found": review.found is None,
+        }
+        new = {name for name, lacks in lacking.items() if lacks} - review.ordered
+        if "signals" in new:
+            self.workshop.write_signals(take)
+        if "stretches" in new:
+            self.workshop.look_through(take, review.used)
+        if "found" in new:
+            self.workshop.find(take, review.setup)
+        return replace(review, signals=signals, stretches=stretches, ordered=review.ordered | new)
+
+    def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
+        motion = kept_motion(take, setup)
+        if motion is None:
+            self.workshop.compute_by(take, setup)
+        return motion
