@@ -80,10 +80,12 @@ def start_studio(tmp_path: Path) -> Iterator[Start]:
         sessions: Path | None = None,
         language: str | None = "en",
         countdown_s: float | None = None,
+        skin: bool = False,  # seconds a picture without a graphics card
     ) -> RunningStudio:
-        if countdown_s is not None:
-            remembered = json.dumps({"countdown_s": countdown_s})
-            (tmp_path / "settings.json").write_text(remembered, encoding="utf-8")
+        if not (tmp_path / "settings.json").exists():
+            remembered: dict[str, object] = {} if skin else {"shown": {"skin": False}}
+            remembered |= {} if countdown_s is None else {"countdown_s": countdown_s}
+            (tmp_path / "settings.json").write_text(json.dumps(remembered), encoding="utf-8")
         spoken = ["--language", language] if language is not None else []
         places = sessions or tmp_path / "sessions", tmp_path / "settings.json"
         studio = _start(*places, *spoken, *arguments)

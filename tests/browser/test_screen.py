@@ -113,7 +113,7 @@ def test_hands_are_free_with_the_space_bar(start_studio: Start, visit: Callable[
 
 @pytest.mark.long
 def test_looks_are_chosen_and_kept(start_studio: Start, visit: Callable[..., Page]) -> None:
-    studio = start_studio("--virtual")
+    studio = start_studio("--virtual", skin=True)
     page = visit(studio, 1440, 900)
     expect(page.get_by_text("Connected")).to_be_visible()
     with drawing(page):
