@@ -42,7 +42,7 @@ DESK_TARGET = (0.0, 0.31, 0.0)
 FIELD_RAD = float(np.deg2rad(75.0))
 """Of the camera from the bottom of the picture to its top: viser's own."""
 
-ABOVE_SHEET = 0.17
+ABOVE_SHEET = 0.05
 """By how much of the picture's height the hand stands above the middle while a take is open."""
 
 _AWAY = np.pi / 2  # y of the picture

@@ -54,7 +54,7 @@ class TransportPanel:
             self._live = gui.add_button(
                 _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
-        self._panel.float(x=16.0, y=-16.0, width=440.0, height=368.0)
+        self._panel.float(x=16.0, y=-16.0, width=440.0, height=404.0)
         self._playing = False
         self._written = 0.0
         self._time.on_update(typed(lambda at_s: send(intents.Seek(at_s))))
