@@ -35,18 +35,17 @@ class Reviewer:
     sensor: str = ""
     opening: Path | None = None
 
-    def opened(self, path: Path, *, preview: bool) -> Review | None:
+    def opened(self, take: Take, *, preview: bool) -> Review | None:
         """A take at its beginning; None: it is computed first, ``preview``: its first seconds now.
 
         Raises:
-            TakeError: it cannot be opened, or nothing moves in it.
+            TakeError: nothing moves in it.
         """
-        take = open_take(path)
         motion = kept_motion(take)
         if motion is not None:
             self.opening = None
             return reviewing.opened(take, motion)
-        self.opening = path
+        self.opening = take.path
         self.workshop.compute(take)
         if preview:
             self.workshop.preview(take)

@@ -527,8 +527,9 @@ class Studio:
         self._open(recovered.path)
 
     def _open(self, path: Path) -> None:
-        preview = self._chooser.serves(open_take(path).header.setup.filter)
-        review = self._reviewer.opened(path, preview=preview)
+        take = open_take(path)
+        preview = self._chooser.serves(take.header.setup.filter)
+        review = self._reviewer.opened(take, preview=preview)
         if review is not None:
             self._show(review)
 

@@ -6,11 +6,10 @@ bit, that of the same instants of the whole take.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TypeAlias
 
 import msgspec
 import numpy as np
@@ -20,7 +19,7 @@ from handstudio import pipeline
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.health.watch import Watch
-from handstudio.process import first_state, process
+from handstudio.process import Progress, first_state, process
 from handstudio.protocol.packets import Packet
 from handstudio.recording.header import Summary
 from handstudio.recording.naming import file_name, free_path
@@ -30,9 +29,6 @@ from handstudio.recording.take import FirstState, Take, pack_first_state
 from handstudio.recording.writer import TakeWriter
 from handstudio.samples import Event, ImuSamples
 from handstudio.stream import EventStream
-
-Progress: TypeAlias = Callable[[float], None]
-"""Told the share that is done, 0 to 1."""
 
 _BATCH = 256  # events of what comes before the part, fused at a time
 
