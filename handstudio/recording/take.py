@@ -6,6 +6,7 @@ import hashlib
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -121,9 +122,9 @@ class Take:
             yield arrival_ns, *stream.feed(chunk, arrival_ns)
 
     def sha256(self) -> str:
-        """Hash of the raw file."""
-        with self.path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        """Hash of the raw file, read once as long as the file is the same."""
+        about = self.path.stat()
+        return _sha256(self.path, about.st_size, about.st_mtime_ns)
 
     def stream(self, from_start: bool = False) -> EventStream:
         """What makes packets and events of its chunks, as it was at the first byte.
@@ -141,6 +142,13 @@ class Take:
         if from_start or not self.first_state.stream:
             return EventStream(setup.decoder, setup.ranges)
         return EventStream.resumed(setup.decoder, setup.ranges, self.first_state.stream)
+
+
+@lru_cache(maxsize=256)
+def _sha256(path: Path, _size: int, _mtime_ns: int) -> str:
+    """What is kept beside a take is called by this, so that a page asks for it again and again."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def open_take(path: Path) -> Take:
