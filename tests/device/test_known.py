@@ -137,6 +137,7 @@ def test_a_reset_turns_headings_without_a_rest_and_twice_is_as_once(connected):
     hand = connected.newest.setup.layout.drivers["hand"]
     assert once[hand] == pytest.approx(np.linspace(-0.3, 0.3, 20)[hand])
     connected.send(ResetHeading("SN1"))
+    connected.until(lambda _: len(connected.reports) == 2, "both are told")
     connected.go_on(5)
     assert not connected.newest.motion.doubt.any()
     assert connected.reports == [HeadingTaken(None), HeadingTaken("SN1")]
