@@ -10,18 +10,23 @@ import hypothesis
 import jaxtyping
 import pytest
 
-# Must stand before anything imports handstudio. From here on every annotated call into it is
-# checked; a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@compiled``.
-jaxtyping.install_import_hook("handstudio", "beartype.beartype")
-
 DATA_VARIABLE = "HANDSTUDIO_DATA"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="also run the tests that take minutes")
+    parser.addoption(
+        "--shapes",
+        action="store_true",
+        help="also check every call against the shapes and types it declares (twice the time)",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--shapes"):
+        # Before anything imports handstudio. From here on every annotated call into it is checked;
+        # a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@compiled``.
+        jaxtyping.install_import_hook("handstudio", "beartype.beartype")
     # The same examples everywhere and every time: a failure in CI is a failure at the desk.
     hypothesis.settings.register_profile(
         "everywhere",

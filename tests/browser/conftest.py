@@ -88,16 +88,13 @@ def start_studio(tmp_path: Path) -> Iterator[Start]:
             (tmp_path / "settings.json").write_text(json.dumps(remembered), encoding="utf-8")
         spoken = ["--language", language] if language is not None else []
         places = sessions or tmp_path / "sessions", tmp_path / "settings.json"
-        studio = _start(*places, *spoken, *arguments)
+        studio = begin(*places, *spoken, *arguments)
         running.append(studio)
         return studio
 
     yield start
     for studio in running:
-        if studio.process.poll() is None:
-            studio.process.send_signal(signal.SIGINT)
-            studio.process.communicate(timeout=30)
-        assert studio.process.returncode == 0
+        end(studio)
 
 
 @pytest.fixture(scope="session")
@@ -154,6 +151,33 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+def begin(sessions: Path, settings: Path, *arguments: str) -> RunningStudio:
+    """A studio in a process of its own, once it serves."""
+    command = [*COMMAND, "studio", "--no-browser", "--port", str(free_port())]
+    process = subprocess.Popen(
+        [*command, "--sessions", str(sessions), *arguments],
+        env={**os.environ, "HANDSTUDIO_SETTINGS": str(settings)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        found = re.search(r"http://[^\s/]+:(\d+)\S*", line)
+        if found:
+            url = f"http://localhost:{found[1]}"
+            return RunningStudio(url, sessions, process, found[0])
+    raise AssertionError("the studio ended before it served")
+
+
+def end(studio: RunningStudio) -> None:
+    """End it, if it has not ended yet; it must end well."""
+    if studio.process.poll() is None:
+        studio.process.send_signal(signal.SIGINT)
+        studio.process.communicate(timeout=30)
+    assert studio.process.returncode == 0
+
+
 @contextmanager
 def glove(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """A virtual glove on TCP, its own process."""
@@ -170,24 +194,6 @@ def glove(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         process.kill()
         process.wait()
         process.stdout.close()
-
-
-def _start(sessions: Path, settings: Path, *arguments: str) -> RunningStudio:
-    command = [*COMMAND, "studio", "--no-browser", "--port", str(free_port())]
-    process = subprocess.Popen(
-        [*command, "--sessions", str(sessions), *arguments],
-        env={**os.environ, "HANDSTUDIO_SETTINGS": str(settings)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert process.stdout is not None
-    for line in process.stdout:
-        found = re.search(r"http://[^\s/]+:(\d+)\S*", line)
-        if found:
-            url = f"http://localhost:{found[1]}"
-            return RunningStudio(url, sessions, process, found[0])
-    raise AssertionError("the studio ended before it served")
 
 
 def _chromium() -> str | None:

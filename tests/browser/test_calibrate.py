@@ -55,6 +55,7 @@ def test_the_first_steps_are_done_alone_and_gone_on_with_later(
     expect(button(page, "Record")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_hands_are_free_with_the_space_bar(start_studio: Start, visit: Callable[..., Page]) -> None:
     _studio, page = begin(start_studio, visit, "virtual:?subject=7&speed=2")
     page.get_by_label("Go on by itself").click()  # it does with a virtual glove
@@ -71,6 +72,7 @@ def test_hands_are_free_with_the_space_bar(start_studio: Start, visit: Callable[
     expect(on).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_sloppy_one_is_refused_with_the_reason(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
@@ -90,6 +92,7 @@ def test_a_sloppy_one_is_refused_with_the_reason(
     expect(page.get_by_text("used all the same")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_device_lost_in_the_middle_begins_the_step_anew(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:

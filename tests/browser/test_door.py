@@ -17,14 +17,18 @@ from websockets.sync.client import connect
 
 from app.door.network import own_addresses
 
-from .conftest import RunningStudio, Start
+from .conftest import DRAW_WHEN_ASKED, RunningStudio, Start, begin, end
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture
-def studio(start_studio: Start) -> RunningStudio:
-    return start_studio()
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStudio]:
+    """One for all that only knock."""
+    place = tmp_path_factory.mktemp("door")
+    studio = begin(place / "sessions", place / "settings.json")
+    yield studio
+    end(studio)
 
 
 def get(studio: RunningStudio, **headers: str) -> int:
@@ -115,6 +119,7 @@ def test_a_link_from_another_site_opens_the_studio_and_forgets_the_token(
     assert len(token) >= 32
     there = f"http://127.0.0.2:{studio.port}"  # an address of this machine, and a foreign site
     context = browser.new_context()
+    context.add_init_script(DRAW_WHEN_ASKED)
     page = context.new_page()
     told: list[str] = []
 
@@ -146,12 +151,14 @@ def test_a_link_from_another_site_opens_the_studio_and_forgets_the_token(
     context.close()
 
 
+@pytest.mark.long
 def test_a_foreign_page_cannot_use_the_cookie_of_ours(
     start_studio: Start, browser: Browser, other_site: http.server.HTTPServer
 ) -> None:
     studio = start_studio("--host", "0.0.0.0")
     there = f"127.0.0.2:{studio.port}"
     context = browser.new_context()
+    context.add_init_script(DRAW_WHEN_ASKED)
     page = context.new_page()
     page.goto(f"http://{there}/?token={studio.link.partition('?token=')[2]}")
     expect(page.get_by_role("tab", name="Device")).to_be_visible()
@@ -172,6 +179,7 @@ def test_a_foreign_page_cannot_use_the_cookie_of_ours(
     context.close()
 
 
+@pytest.mark.long
 def test_the_token_stands_nowhere_but_in_the_link(
     start_studio: Start, tmp_path: Path, log_folder: Path
 ) -> None:
@@ -189,6 +197,7 @@ def test_the_token_stands_nowhere_but_in_the_link(
         assert not file.is_file() or token.encode() not in file.read_bytes()
 
 
+@pytest.mark.long
 def test_a_token_of_ones_own_comes_by_the_environment_and_is_not_said_again(
     start_studio: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -145,6 +145,7 @@ def test_looks_are_chosen_and_kept(start_studio: Start, visit: Callable[..., Pag
     expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", "light")
 
 
+@pytest.mark.long
 def test_the_library_is_kept_tidy(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:

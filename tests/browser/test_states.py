@@ -72,6 +72,7 @@ def test_a_lost_device_is_shown_and_the_take_goes_on(
     assert summary.packets > 200
 
 
+@pytest.mark.long
 def test_ctrl_c_while_recording_keeps_the_take(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
@@ -92,6 +93,7 @@ def test_ctrl_c_while_recording_keeps_the_take(
     assert summary.duration_s > 2.4
 
 
+@pytest.mark.long
 def test_an_interrupted_recording_can_be_had_back(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path
 ) -> None:
@@ -133,6 +135,7 @@ def test_on_a_narrow_page_the_plots_start_put_away(
     expect(narrow.get_by_text("MCP flexion")).not_to_be_visible()
 
 
+@pytest.mark.long
 @pytest.mark.real
 def test_real_recordings_are_replayed(
     start_studio: Start, visit: Callable[..., Page], tmp_path: Path, data_dir: Path
@@ -169,6 +172,7 @@ def write_hinge(folder: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_a_virtual_person_does_what_is_asked_and_says_what_not(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:

@@ -43,7 +43,9 @@ LOST_WITHIN_S = 1.0  # of silence, what a person must see
 # --- live and processed motion --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("rate_hz", "instants"), [(100, 200), (1000, 1200)])
+@pytest.mark.parametrize(
+    ("rate_hz", "instants"), [(100, 200), pytest.param(1000, 1200, marks=pytest.mark.long)]
+)
 def test_the_take_of_a_virtual_glove_gives_the_motion_that_was_shown(studio, rate_hz, instants):
     newest = studio.connect(f"virtual:?rate={rate_hz}&seed=21")
     assert newest.setup.rate_hz == rate_hz

@@ -182,7 +182,7 @@ def survives(folder: Path, seed: int, moments: int, program: str) -> None:
 
 
 def test_a_recording_that_is_killed_loses_a_quarter_of_a_second_at_most(tmp_path):
-    survives(tmp_path, 81, 4, RECORD)
+    survives(tmp_path, 81, 2, RECORD)
 
 
 @pytest.mark.long

@@ -80,6 +80,7 @@ def check_takes(studio, most: int) -> None:
             assert array.tobytes() == np.asarray(getattr(computed, name)).tobytes(), (path, name)
 
 
+@pytest.mark.long
 def test_a_troubled_quarter_of_a_minute_leaves_whole_takes(studio, glove):
     soak(studio, glove, 101, 25)
 

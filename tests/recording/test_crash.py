@@ -59,7 +59,7 @@ def numbers(path: Path) -> list[int]:
 @posix
 @pytest.mark.parametrize(
     "times",
-    [pytest.param(5, id="a few times"), pytest.param(30, id="many", marks=pytest.mark.long)],
+    [pytest.param(2, id="twice"), pytest.param(30, id="many", marks=pytest.mark.long)],
 )
 def test_a_writer_that_is_killed_loses_only_what_it_had_not_flushed(tmp_path, times):
     rng = random.Random(times)

@@ -311,6 +311,7 @@ def calibrated(handstudio, tumble, tmp_path_factory) -> tuple[Path, dict]:
     return sessions, said.json
 
 
+@pytest.mark.long
 def test_sensors_are_calibrated_from_a_tumble(tumble, calibrated):
     sessions, told = calibrated
     setup = open_take(tumble).header.setup
@@ -328,6 +329,7 @@ def test_sensors_are_calibrated_from_a_tumble(tumble, calibrated):
     assert encode_device(kept).encode() == Path(told["kept"]).read_bytes()
 
 
+@pytest.mark.long
 def test_sensors_are_told_and_refused_where_the_verdict_is_bad(
     here, take, calibrated, sessions, monkeypatch
 ):
@@ -349,6 +351,7 @@ def test_sensors_are_told_and_refused_where_the_verdict_is_bad(
     assert device_history(sessions, found.device)
 
 
+@pytest.mark.long
 def test_an_older_calibration_of_sensors_is_restored(here, calibrated, sessions):
     one = decode_device(Path(calibrated[1]["kept"]).read_bytes())
     two = msgspec.structs.replace(one, made_utc="2036-03-04T12:30:00+00:00")
@@ -364,6 +367,7 @@ def test_an_older_calibration_of_sensors_is_restored(here, calibrated, sessions)
     assert line.endswith("in use")
 
 
+@pytest.mark.long
 def test_a_take_is_exported_with_corrected_sensors_of_its_device_only(
     here, take, calibrated, tmp_path
 ):
@@ -382,6 +386,7 @@ def test_a_take_is_exported_with_corrected_sensors_of_its_device_only(
     assert told["sensor_calibration"]["residuals"].keys() == found.by_name.keys()
 
 
+@pytest.mark.long
 def test_sensors_of_two_devices_are_not_mixed(here, take, tumble, sessions):
     said = here("calibrate-sensors", take, tumble, "--sessions", sessions)
     assert said.code == 1

@@ -24,6 +24,7 @@ def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_take_is_checked_against_a_calibration(handstudio, take, tmp_path):
     file = save_calibration(tmp_path, hand())
     said = handstudio("check", take, "--calibration", file)
@@ -38,6 +39,7 @@ def test_without_a_calibration_or_a_take_it_says_so(handstudio, take):
     assert "No take was named" in handstudio("check").err
 
 
+@pytest.mark.long
 def test_headings_are_aligned_by_the_takes_own_quick_start(handstudio, take):
     plain = handstudio("process", take, "--json").json
     said = handstudio("process", take, "--align", "--json")
