@@ -1,7 +1,7 @@
 """Array types used in signatures.
 
-Shapes are written with jaxtyping (``Float[Array, "n 3"]``); they are checked while the tests run
-and cost nothing otherwise.
+Shapes are written with jaxtyping (``Float[Array, "n 3"]``); they are checked where tests run with
+``--shapes`` and cost nothing otherwise.
 """
 
 from __future__ import annotations

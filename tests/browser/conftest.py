@@ -36,7 +36,7 @@ CHROMIUM_ARGUMENTS = [
     "--no-first-run",
 ]
 
-# The scene is drawn only while `window.drawn` says so (page.drawing): whatever else a page does, it
+# The scene is drawn only while `window.drawn` says so (page.look): whatever else a page does, it
 # then does at once, and the studio beside it has a core for itself. Pictures not drawn leave the
 # last one standing.
 DRAW_WHEN_ASKED = """

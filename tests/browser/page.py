@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import PIL.Image
@@ -16,17 +14,16 @@ from app.views.recording import clock_of
 CENTRE = {"x": 340, "y": 240, "width": 650, "height": 390}  # between notices and transport
 
 
-@contextmanager
-def drawing(page: Page) -> Iterator[None]:
-    """The scene is drawn as long as this lasts; without, it stands still."""
-    page.evaluate("window.drawn = true")
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    yield
-    page.evaluate("window.drawn = false")
+# A picture by the processor alone takes a second: one is drawn when it is looked at, no more.
+DRAW_ONE = """new Promise(done => {
+  window.drawn = true;
+  requestAnimationFrame(() => requestAnimationFrame(() => { window.drawn = false; done(); }));
+})"""
 
 
 def look(page: Page) -> np.ndarray:
-    """The centre of the page as pixels."""
+    """The centre of the page as pixels; its scene is drawn for that, and stands still else."""
+    page.evaluate(DRAW_ONE)
     shot = page.screenshot(clip=CENTRE)  # type: ignore[arg-type]
     return np.asarray(PIL.Image.open(io.BytesIO(shot)).convert("RGB"), dtype=float)
 
@@ -38,25 +35,23 @@ def changed(before: np.ndarray, after: np.ndarray) -> float:
 
 def moves_within(page: Page, seconds: float) -> bool:
     """Whether the picture changes clearly in that time."""
-    with drawing(page):
-        before = look(page)
-        for _ in range(int(seconds * 2)):
-            page.wait_for_timeout(500)
-            if changed(before, look(page)) > 0.01:
-                return True
+    before = look(page)
+    for _ in range(int(seconds * 2)):
+        page.wait_for_timeout(500)
+        if changed(before, look(page)) > 0.01:
+            return True
     return False
 
 
 def settles_within(page: Page, seconds: float) -> bool:
     """Whether the picture comes to rest in that time."""
-    with drawing(page):
-        before = look(page)
-        for _ in range(int(seconds)):
-            page.wait_for_timeout(1000)
-            now = look(page)
-            if changed(before, now) < 0.001:
-                return True
-            before = now
+    before = look(page)
+    for _ in range(int(seconds)):
+        page.wait_for_timeout(1000)
+        now = look(page)
+        if changed(before, now) < 0.001:
+            return True
+        before = now
     return False
 
 

@@ -20,7 +20,7 @@ from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take
 
 from .conftest import Start, free_port, glove
-from .page import begin_recording, button, changed, choose, drawing, field, look, record
+from .page import begin_recording, button, changed, choose, field, look, record
 
 pytestmark = pytest.mark.browser
 
@@ -116,22 +116,19 @@ def test_looks_are_chosen_and_kept(start_studio: Start, visit: Callable[..., Pag
     studio = start_studio("--virtual", skin=True)
     page = visit(studio, 1440, 900)
     expect(page.get_by_text("Connected")).to_be_visible()
-    with drawing(page):
-        dark = look(page)
+    dark = look(page)
     page.get_by_text("Settings", exact=True).click()
     page.get_by_label("Light page").click()
     expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", "light")
-    with drawing(page):
-        light = look(page)
+    light = look(page)
     assert light.mean() > dark.mean() + 80
     page.mouse.click(660, 360)  # keys go to the field that was clicked last, until another is
     page.keyboard.press("5")
     page.keyboard.press("n")
-    with drawing(page):
-        bare = look(page)
-        page.keyboard.press("b")  # skin alone: nothing is seen through it
-        page.wait_for_timeout(1500)
-        assert changed(bare, look(page)) > 0.01
+    bare = look(page)
+    page.keyboard.press("b")  # skin alone: nothing is seen through it
+    page.wait_for_timeout(1500)
+    assert changed(bare, look(page)) > 0.01
     page.keyboard.press("b")
     page.keyboard.press("g")
     page.wait_for_timeout(1000)
