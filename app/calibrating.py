@@ -18,6 +18,8 @@ from handstudio.device.capture import Capture
 from handstudio.device.orders import Ask, Newest, Phase, ShareSamples
 from handstudio.device.recorder import Recorder
 from handstudio.errors import CalibrationError, HandstudioError
+from handstudio.hand.skeleton import HandType
+from handstudio.layout import Layout, divisible, with_hand_type
 from handstudio.protocol.commands import PERFORM
 from handstudio.recording.notes import load_notes, save_notes, with_label
 from handstudio.settings import Settings
@@ -72,7 +74,14 @@ class Calibrator:
         if setup is None or state.subject is None:
             return None
         code, performing = state.subject.code, performs(state.newest)
-        return Courses(self.sessions, code, setup.layout, setup.rate_hz, performing)
+        layout = _divided(setup.layout, state.settings.hand_type)
+        return Courses(self.sessions, code, layout, setup.rate_hz, performing)
+
+    @property
+    def hand_type(self) -> HandType | None:
+        """How the palm is divided by what is computed of the course; None: as its takes have it."""
+        layout = None if self._courses is None else self._courses.layout
+        return layout.hand_type if layout is not None and divisible(layout) else None
 
     def stands(self, state: State) -> tuple[Stand, ...]:
         """Where the courses stand."""
@@ -291,6 +300,10 @@ class Calibrator:
         self.capture.send(ShareSamples(on=False))
         self.taker.stop()
         self.guided, self._recorder = None, None
+
+
+def _divided(layout: Layout, hand_type: HandType) -> Layout:
+    return with_hand_type(layout, hand_type) if divisible(layout) else layout
 
 
 def performs(newest: Newest) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from app.look import View
 from handstudio.export.part import Content
+from handstudio.hand.skeleton import HandType
 from handstudio.wizards import course
 
 
@@ -79,6 +80,13 @@ class SetTakeName:
     """What the next takes are called."""
 
     name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetHandType:
+    """How the next calibration divides the palm."""
+
+    hand_type: HandType
 
 
 @dataclass(frozen=True, slots=True)
@@ -485,6 +493,7 @@ Intent: TypeAlias = (
     | SaveSubject
     | SetVisit
     | SetTakeName
+    | SetHandType
     | SetCountdown
     | SetSounds
     | SetTheme

@@ -18,6 +18,7 @@ from handstudio.errors import HandstudioError
 from handstudio.export.export import export
 from handstudio.export.formats import format_named
 from handstudio.export.part import Content, Processed, Window
+from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured, measure
 from handstudio.process import kept_motion, process
 from handstudio.recording.take import open_take
@@ -109,10 +110,15 @@ class Jobs:
         self._reset()
         return self._pool.submit(_trim, path, begin_s, end_s, name)
 
-    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Answer]:
-        """Compute what a course is for from its takes, and keep what is to be used from now on."""
+    def solve(
+        self, course: str, paths: Sequence[Path], sessions: Path, hand_type: HandType | None = None
+    ) -> Future[Answer]:
+        """Compute what a course is for from its takes, and keep what is to be used from now on.
+
+        A palm is divided as the takes' layout has it unless ``hand_type`` says otherwise.
+        """
         self._reset()
-        return self._pool.submit(_solve, course, tuple(paths), sessions)
+        return self._pool.submit(_solve, course, tuple(paths), sessions, hand_type)
 
     def cancel(self) -> None:
         """Stop the present job at its next step; its future then raises `Stopped`."""
@@ -198,5 +204,7 @@ def _find(path: Path, setup: Setup) -> Found:
     return Found() if motion is None else found_in(setup, motion)
 
 
-def _solve(course: str, paths: tuple[Path, ...], sessions: Path) -> Answer:
-    return solve(course, [open_take(path) for path in paths], sessions, _tell)
+def _solve(
+    course: str, paths: tuple[Path, ...], sessions: Path, hand_type: HandType | None
+) -> Answer:
+    return solve(course, [open_take(path) for path in paths], sessions, hand_type, _tell)

@@ -12,6 +12,7 @@ from handstudio.calibration.heading import HeadingAlignment
 from handstudio.calibration.noise import Noise, noise_of
 from handstudio.check import Checked, check
 from handstudio.errors import CalibrationError
+from handstudio.hand.skeleton import HandType
 from handstudio.process import aligned_setup
 from handstudio.recording.at_rest import static_recordings
 from handstudio.recording.calibrations import save_calibration
@@ -28,8 +29,12 @@ Answer: TypeAlias = Calibrated | Checked | HeadingAlignment | SensorsFound | Noi
 """What came of a course."""
 
 
-def solve(name: str, takes: Sequence[Take], sessions: Path, tell: Tell) -> Answer:
+def solve(
+    name: str, takes: Sequence[Take], sessions: Path, hand_type: HandType | None, tell: Tell
+) -> Answer:
     """Compute what a course is for, and keep what is to be used from now on.
+
+    A hand's palm is divided as the takes' layout has it unless ``hand_type`` says otherwise.
 
     Raises:
         CalibrationError: it cannot be computed from these takes, or not be kept.
@@ -37,7 +42,7 @@ def solve(name: str, takes: Sequence[Take], sessions: Path, tell: Tell) -> Answe
     """
     match name:
         case "hand":
-            calibrated = calibrate(takes, tell)
+            calibrated = calibrate(takes, tell, hand_type)
             save_calibration(sessions, calibrated.calibration)
             return calibrated
         case "check":

@@ -299,6 +299,8 @@ class Studio:
                 change(visit=name)
             case intents.SetTakeName(name=name):
                 change(take_name=name)
+            case intents.SetHandType(hand_type=hand_type):
+                change(hand_type=hand_type)
             case intents.SetCountdown(seconds=seconds):
                 change(countdown_s=seconds)
             case intents.SetSounds(on=on):
@@ -447,7 +449,9 @@ class Studio:
         takes, result = calibrator.to_solve(), calibrator.result
         if takes and result is not None and not self._solving:
             self._solving = True
-            self._workshop.solve(result.course.name, takes, self.state.sessions)
+            self._workshop.solve(
+                result.course.name, takes, self.state.sessions, calibrator.hand_type
+            )
         self._show_guided()
         for problem in self._holder.follow(self.state):
             self._say(problem)

@@ -18,6 +18,7 @@ from app.words import _, language
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.process import process_head
@@ -269,9 +270,11 @@ class Workshop:
         words = _("Gathering diagnostics")
         self._pending.append(_Pending(self._aside.submit(make), use, words))
 
-    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> None:
+    def solve(
+        self, course: str, paths: Sequence[Path], sessions: Path, hand_type: HandType | None
+    ) -> None:
         """What a course is for."""
-        future = self.jobs.solve(course, paths, sessions)
+        future = self.jobs.solve(course, paths, sessions, hand_type)
         words = _("Computing the calibration")
         self._pending.append(_Pending(future, Solved, words, Solved))
 

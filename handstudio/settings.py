@@ -19,7 +19,7 @@ import msgspec
 import platformdirs
 
 from handstudio.errors import HandstudioError, SettingsError
-from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide
+from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide, HandType
 from handstudio.recording.atomic import BACKUP, write_atomically
 
 FILE_VARIABLE = "HANDSTUDIO_SETTINGS"
@@ -55,6 +55,7 @@ class Settings(msgspec.Struct, frozen=True):
         camera: Name of the view.
         side: Which hand, where a device does not know.
         hand_length_mm: Of a subject whose hand was not measured.
+        hand_type: How a calibration divides the palm, where the glove can tell.
         plot_span_s: How much time live plots show.
         filter: Name of the live filter; empty: whatever suits the device.
         curves: Name of the set of curves that is plotted.
@@ -72,6 +73,7 @@ class Settings(msgspec.Struct, frozen=True):
     camera: str = ""
     side: HandSide = "right"
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3
+    hand_type: HandType = 3
     plot_span_s: float = 10.0
     filter: str = ""
     curves: str = "overview"

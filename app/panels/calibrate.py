@@ -17,6 +17,7 @@ from app.views.steps import course_name
 from app.words import _
 from handstudio.calibration.course import COURSES
 from handstudio.device.orders import Phase
+from handstudio.hand.skeleton import HandType
 from handstudio.wizards.course import GoByItself
 
 Which: TypeAlias = Literal["none", "again", "previous"]
@@ -45,6 +46,11 @@ class CalibratePanel:
         self._sheet = gui.add_html("")
         names = sorted(COURSES, key=_ORDER.index) if set(COURSES) <= set(_ORDER) else list(COURSES)
         self._rows = {name: _CourseRow(gui, send, name) for name in names}
+        self._palm = gui.add_dropdown(
+            _("Palm"),
+            tuple(_palms()),
+            hint=_("How the calibration divides the palm: hand types 3, 2 and 1"),
+        )
         self._none = gui.add_button(_("Use no calibration"), color=QUIET, visible=False)
         self._again = gui.add_button(_("Use the calibration again"), color=QUIET, visible=False)
         self._previous = gui.add_button(_("Use the calibration before"), color=QUIET, visible=False)
@@ -61,6 +67,7 @@ class CalibratePanel:
             )
         self._step.on_update(typed(self._pick))
         self._redo.on_click(lambda _event: self._say_redo(send))
+        self._palm.on_update(typed(lambda palm: send(intents.SetHandType(_palms()[palm]))))
         self._by_itself.on_update(typed(lambda on: send(intents.Guide(GoByItself(on)))))
         self._reset.on_click(lambda _event: send(intents.ResetHeading(self._sensor())))
 
@@ -82,6 +89,8 @@ class CalibratePanel:
         stands = {stand.name: stand for stand in view.stands_of(state)}
         for name, row in self._rows.items():
             row.render(None if on else stands.get(name), ready=_ready(state))
+        put(self._palm, visible=not on and view.palm_is_chosen(state))
+        put(self._palm, value=_palm(state.settings.hand_type))
         in_use = state.in_use
         put(self._none, visible=not on and in_use.subject is not None)
         put(self._again, visible=not on and in_use.none)
@@ -114,6 +123,18 @@ class CalibratePanel:
 
 def _using(send: Send, which: Which) -> Callable[[Any], None]:
     return lambda _event: send(intents.UseCalibration(which))
+
+
+def _palms() -> dict[str, HandType]:
+    return {
+        _("Ulnar block hinged to the radial one"): 3,
+        _("Two blocks from the wrist"): 2,
+        _("One block"): 1,
+    }
+
+
+def _palm(hand_type: HandType) -> str:
+    return next(words for words, each in _palms().items() if each == hand_type)
 
 
 _ORDER = ("hand", "check", "quick_start", "sensors", "noise")

@@ -35,6 +35,7 @@ from handstudio.calibration.verdict import Reading, Verdict
 from handstudio.device.orders import Phase as Line
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import HandSide, Skeleton
+from handstudio.layout import divisible
 from handstudio.wizards.course import (
     Accept,
     Course,
@@ -280,6 +281,12 @@ def step_choices(course: Course) -> dict[str, int]:
 def stands_of(state: State) -> tuple[Stand, ...]:
     """The courses that can be begun, or all there are while nobody or no device is there."""
     return state.stands or stands_without_device()
+
+
+def palm_is_chosen(state: State) -> bool:
+    """Whether how the palm is divided is for a person to say: the glove there can tell each way."""
+    setup = state.newest.setup
+    return setup is not None and divisible(setup.layout)
 
 
 def stand_of(stand: Stand) -> str:

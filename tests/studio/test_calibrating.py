@@ -140,9 +140,12 @@ class Solver:
 
     def __init__(self, outcome: Any) -> None:
         self.outcome, self.asked, self.course = outcome, list[Path](), ""
+        self.hand_type: int | None = None
 
-    def solve(self, course: str, paths: Sequence[Path], sessions: Path) -> Future[Any]:
-        self.course, self.asked = course, list(paths)
+    def solve(
+        self, course: str, paths: Sequence[Path], sessions: Path, hand_type: int | None
+    ) -> Future[Any]:
+        self.course, self.asked, self.hand_type = course, list(paths), hand_type
         future: Future[Any] = Future()
         if isinstance(self.outcome, Exception):
             future.set_exception(self.outcome)
@@ -449,6 +452,17 @@ def test_after_the_last_step_the_calibration_is_computed_from_its_takes(guided: 
     assert "45.8 ± 0.6 mm" in sheet.content
     assert "Calibrated." in sheet.content
     assert after(guided.studio, intents.CloseResult()).result is None
+
+
+@pytest.mark.parametrize("hand_type", [1, 2, 3])
+def test_the_palm_is_divided_as_was_chosen(guided: Guided, hand_type: Any) -> None:
+    state = after(guided.studio, intents.SetHandType(hand_type))
+    assert view.palm_is_chosen(state)
+    state = guided.begin()
+    assert state.guided is not None
+    assert state.guided.course.layout.hand_type == hand_type
+    finished(guided, calibrated())
+    assert guided.studio._workshop.jobs.hand_type == hand_type  # type: ignore[attr-defined]
 
 
 def test_what_is_worth_repeating_is_offered_and_done_in_another_take(guided: Guided) -> None:
