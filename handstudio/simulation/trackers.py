@@ -72,8 +72,8 @@ class TrackerErrors:
 
 
 ON_A_FINGER = TrackerErrors(tug_rad=float(np.deg2rad(0.3)), knocked=0.1)
-"""Terminals on a finger, moved as one pleases. Tugs and knocks are sized on `subject.DEVELOPMENT` so
-that axes scatter, and the seed's points lie apart, as in its figures 11 and 12; nothing else is."""
+"""Terminals on a finger. Tugs and knocks are sized on `subject.DEVELOPMENT` so that axes scatter, and
+the seed's points lie apart, as in its figures 11 and 12; nothing else is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +133,7 @@ def tracked(
     for index, name in enumerate(segments):
         rng = generator(seed, _NOISE, performance, index)
         t, q = _loose(time_s, t_true[:, index], q_true[:, index], errors, rng)
-        tracks.append(_told(name, time_s, t, q, errors, rng))
+        tracks.append(_told(name, time_s, (t, q), errors, rng))
     return Tracked(
         tuple(tracks),
         so3.multiply(q_base_world, hand.q),
@@ -157,9 +157,7 @@ _NOISE, _STRAP = 60, 61  # which of a seed's streams
 _STRAPPED_DEG = 6.0  # sd: how a transmitter is turned on a wrist or palm
 
 
-def _base(
-    subject: Subject, q: Array, t: Array, base: str | None, seed: int
-) -> tuple[Array, Array]:
+def _base(subject: Subject, q: Array, t: Array, base: str | None, seed: int) -> tuple[Array, Array]:
     """Where the transmitter is; its y lies across the hand, as the seed has it."""
     if base is None:
         return np.tile(so3.IDENTITY, (len(q), 1)), np.zeros((len(q), 3))
@@ -197,10 +195,15 @@ def _loose(
 
 
 def _told(
-    name: str, time_s: Array, t: Array, q: Array, errors: TrackerErrors, rng: np.random.Generator
+    name: str,
+    time_s: Array,
+    pose: tuple[Array, Array],
+    errors: TrackerErrors,
+    rng: np.random.Generator,
 ) -> Track:
+    t, q = pose
     if errors.metal:
-        t, q = _bent_by_metal(t, q, errors.metal)
+        t, q = bent_by_metal(t, q, errors.metal)
     t = t + errors.noise_m * rng.standard_normal(t.shape)
     q = so3.multiply(q, so3.exp(errors.noise_rad * rng.standard_normal(t.shape)))
     quality = np.ones(len(t))
@@ -224,7 +227,7 @@ def _drop_outs(time_s: Array, errors: TrackerErrors, rng: np.random.Generator) -
     return gone
 
 
-def _bent_by_metal(t: Array, q: Array, metal: tuple[Metal, ...]) -> tuple[Array, Array]:
+def bent_by_metal(t: Array, q: Array, metal: tuple[Metal, ...]) -> tuple[Array, Array]:
     """What a tracker that knows of no metal makes of its signals."""
     heard = signals(t, q)
     q_terminal_room = so3.to_matrix(so3.conjugate(q))

@@ -83,7 +83,7 @@ def helical_axes(pair: Pair, window: float = WINDOW_RAD) -> HelicalAxes:
 
 
 def mean_helical(pair: Pair, plane: Plane | None = None) -> JointEstimate:
-    """The pivot of all axes, in the upper terminal's frame and, the other way round, the lower's."""
+    """The pivot of all axes, in the upper terminal's frame; the other way round in the lower's."""
     middle = rest_place(pair) if plane is None else plane.p1
     there, back = helical_axes(pair), helical_axes(pair.swapped())
     upper, upper_covariance = _pivot(there, middle)

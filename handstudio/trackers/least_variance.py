@@ -32,7 +32,7 @@ _TRIES = 60
 _STEP_M = 2e-3
 
 
-def least_variance(pair: Pair, plane: Plane | None = None) -> JointEstimate:  # noqa: ARG001 - one signature for all
+def least_variance(pair: Pair, plane: Plane | None = None) -> JointEstimate:
     """Anywhere in space (0038 to 0044), by Gauss and Newton's way.
 
     What the variance does not tell, a hinge's place along its axis, stays near the guess half way

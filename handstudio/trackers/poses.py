@@ -10,7 +10,7 @@ from handstudio.maths import so3
 
 
 def mean_attitude(q: Float[Array, "n 4"]) -> Float[Array, "4"]:
-    """The attitude nearest to all of them (F. L. Markley et al., J. Guid. Control Dyn. 30, 2007)."""
+    """The attitude nearest to all of them (F. L. Markley et al., JGCD 30, 2007)."""
     _, axes = np.linalg.eigh(q.T @ q)
     mean = axes[:, -1]
     return np.asarray(mean if mean[0] >= 0.0 else -mean)

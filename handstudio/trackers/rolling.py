@@ -19,9 +19,9 @@ own path instead of one component of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
@@ -33,6 +33,7 @@ from handstudio.trackers.plane import Plane
 _ROUNDS = 25
 _CAUCHY = 2.0  # residuals of so many standard deviations count half
 _LEAST_BEND = float(np.deg2rad(20.0))
+_FRAME_M = 1e-4
 _FINEST_M, _FINEST_RAD = 2e-5, 2e-4  # below it residuals are nothing but rounding
 
 
@@ -82,10 +83,8 @@ def rolling(pair: Pair, plane: Plane | None = None, known: Known | None = None) 
         mean = float(np.average(flexion, weights=weight))
         beyond = flexion - mean
         rows = _rows(pair, beyond)
-        prior, expected, precision = _prior(pair, axis, middle, known)
-        square = (weight[:, None, None] * np.swapaxes(rows, 1, 2) @ rows).sum(axis=0)
-        right = np.einsum("n,nji,nj->i", weight, rows, pair.t_upper_lower)
-        left = _left(square, right, rows, pair, prior, expected, precision)
+        prior = _prior(pair, axis, middle, known)
+        left = _left(rows, pair, weight, prior)
         place_sd = max(_FINEST_M, _spread(np.linalg.norm(left, axis=1)))
         lean_sd = max(_FINEST_RAD, _spread(np.linalg.norm(lean, axis=1)))
         off = (np.sum(left**2, axis=1) / place_sd**2 + np.sum(lean**2, axis=1) / lean_sd**2) / 2.0
@@ -94,8 +93,9 @@ def rolling(pair: Pair, plane: Plane | None = None, known: Known | None = None) 
             break
         weight = new
     data = _precision_of(left, weight)
-    covariance = np.linalg.inv(data * square + prior.T @ (precision[:, None] * prior))
-    x = covariance @ (data * right + prior.T @ (precision * expected))
+    square, right = _sums(rows, pair, weight)
+    covariance = np.linalg.inv(data * square + prior.square)
+    x = covariance @ (data * right + prior.right)
     return JointEstimate(
         "rolling",
         x[0:3],
@@ -136,10 +136,14 @@ def _rows(pair: Pair, beyond: Array) -> Array:
     return rows
 
 
-def _prior(
-    pair: Pair, axis: Array, middle: Array, known: Known
-) -> tuple[Array, Array, Array]:
-    """Rows, values and weights of what is known."""
+class _Observed(NamedTuple):
+    """What is known, as sums of weighted rows, and of rows times values."""
+
+    square: Array
+    right: Array
+
+
+def _prior(pair: Pair, axis: Array, middle: Array, known: Known) -> _Observed:
     to_lower = so3.conjugate(pair.rest_q_upper_lower)
     along = pair.rest_t_upper_lower - axis * (axis @ pair.rest_t_upper_lower)
     along = along / np.linalg.norm(along)
@@ -165,23 +169,22 @@ def _prior(
     for block, directions in ((2, (axis, palm)), (3, (axis_l, palm_l))):
         for direction in directions:
             add(block, direction, 0.0, known.other_sd_m)
-    return np.array(rows), np.array(values), 1.0 / np.array(sds) ** 2
+    weighted = np.array(rows).T / np.array(sds) ** 2
+    return _Observed(weighted @ np.array(rows), weighted @ np.array(values))
 
 
-def _left(
-    square: Array,
-    right: Array,
-    rows: Array,
-    pair: Pair,
-    prior: Array,
-    expected: Array,
-    precision: Array,
-) -> Array:
-    """Residuals of places, with what is known counting as a frame of a tenth of a millimetre."""
-    scale = 1e-4**2
-    normal = square + scale * prior.T @ (precision[:, None] * prior)
-    x = np.linalg.solve(normal, right + scale * prior.T @ (precision * expected))
+def _left(rows: Array, pair: Pair, weight: Array, known: _Observed) -> Array:
+    """Residuals of places, with what is known counting as against frames of a tenth of a mm."""
+    square, right = _sums(rows, pair, weight)
+    normal = square + _FRAME_M**2 * known.square
+    x = np.linalg.solve(normal, right + _FRAME_M**2 * known.right)
     return np.asarray(pair.t_upper_lower - rows @ x)
+
+
+def _sums(rows: Array, pair: Pair, weight: Array) -> tuple[Array, Array]:
+    weighted = weight[:, None, None] * rows
+    flat = weighted.reshape(-1, rows.shape[2])
+    return flat.T @ rows.reshape(-1, rows.shape[2]), flat.T @ pair.t_upper_lower.ravel()
 
 
 def _spread(size: Array) -> float:
