@@ -1,4 +1,4 @@
-"""Virtual people bend a finger with terminals beside a joint; how far methods are from the truth."""
+"""Virtual people bend a finger, terminals beside a joint: how far methods are from the truth."""
 
 from __future__ import annotations
 

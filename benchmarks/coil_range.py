@@ -22,7 +22,7 @@ _METAL_RADIUS_M = 0.01
 
 
 def coil_range(seed: int = 1) -> list[dict[str, float]]:
-    """A row a distance: errors (RMS over directions and attitudes) of both ways, and the sd told."""
+    """A row a distance: errors of both ways, RMS over directions and attitudes, and the sd told."""
     rng = np.random.default_rng(seed)
     noise = SHARE * 2.0 / NOISE_AT**3
     return [_at(distance, noise, rng) for distance in DISTANCES_M]

@@ -58,7 +58,7 @@ def hinge_only(trajectory: Trajectory, joint: str) -> Trajectory:
     keep = 3 * joint_index(joint)
     still = np.arange(coefficients.shape[2]) != keep
     coefficients[:-1, :, still] = 0.0
-    coefficients[-1, :, still] = trajectory.start[still][:, None].T
+    coefficients[-1, :, still] = trajectory.start[still][:, None]
     return replace(trajectory, coefficients=coefficients)
 
 

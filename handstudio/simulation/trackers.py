@@ -72,8 +72,8 @@ class TrackerErrors:
 
 
 ON_A_FINGER = TrackerErrors(tug_rad=float(np.deg2rad(0.3)), knocked=0.1)
-"""Terminals on a finger. Tugs and knocks are sized on `subject.DEVELOPMENT` so that axes scatter, and
-the seed's points lie apart, as in its figures 11 and 12; nothing else is."""
+"""Terminals on a finger. Tugs and knocks are sized on `subject.DEVELOPMENT` so that axes scatter,
+and the seed's points lie apart, as in its figures 11 and 12; nothing else is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
