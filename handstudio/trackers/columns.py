@@ -1,8 +1,8 @@
 """Columns of numbers, of a file or a stream, as tracks.
 
 For each terminal NAME its place, ``NAME_x_m, NAME_y_m, NAME_z_m`` (or ``_cm`` or ``_mm``), and its
-attitude, terminal to tracker: ``NAME_qw, NAME_qx, NAME_qy, NAME_qz``, or azimuth, elevation and roll
-about z, y and x in this order, as Polhemus means them: ``NAME_azimuth_deg, NAME_elevation_deg,
+attitude, terminal to tracker: ``NAME_qw, NAME_qx, NAME_qy, NAME_qz``, or azimuth, elevation and
+roll about z, y and x in this order, as Polhemus means them: ``NAME_azimuth_deg, NAME_elevation_deg,
 NAME_roll_deg``. ``NAME_quality``, 0 to 1, may be there. NaN: not seen.
 """
 

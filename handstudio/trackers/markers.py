@@ -86,8 +86,8 @@ def track_of(
         TrackError: in most frames the markers are the cluster's mirror image.
     """
     seen = np.isfinite(t_room_marker).all(axis=2)
-    enough = seen.sum(axis=1) >= LEAST_MARKERS
-    enough &= _spans(cluster.t_cluster_marker, seen, enough)
+    enough: Array = np.asarray(seen.sum(axis=1) >= LEAST_MARKERS)
+    enough = enough & _spans(cluster.t_cluster_marker, seen, enough)
     n = len(time_us)
     t, q, quality = np.full((n, 3), np.nan), np.full((n, 4), np.nan), np.zeros(n)
     if enough.any():

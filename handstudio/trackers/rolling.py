@@ -26,6 +26,7 @@ import numpy as np
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3
+from handstudio.trackers.attitude_noise import seeming, told
 from handstudio.trackers.estimate import JointEstimate, in_lower, independent, rest_place
 from handstudio.trackers.pair import Pair
 from handstudio.trackers.plane import Plane
@@ -94,8 +95,9 @@ def rolling(pair: Pair, plane: Plane | None = None, known: Known | None = None) 
         weight = new
     data = _precision_of(left, weight)
     square, right = _sums(rows, pair, weight)
-    covariance = np.linalg.inv(data * square + prior.square)
-    x = covariance @ (data * right + prior.right)
+    noise = seeming(pair, axis, beyond, weight)
+    covariance = np.linalg.inv(data * told(square, noise) + prior.square)
+    x = np.linalg.solve(data * (square - noise) + prior.square, data * right + prior.right)
     return JointEstimate(
         "rolling",
         x[0:3],
