@@ -54,7 +54,11 @@ class LslTracker:
             DeviceError: the stream went away for good.
         """
         try:
-            rows, stamps = self._inlet.pull_chunk(timeout=timeout_s, max_samples=4096)
+            # a chunk with a time to wait would wait until it is full
+            first, at = self._inlet.pull_sample(timeout=timeout_s)
+            rows, stamps = self._inlet.pull_chunk(timeout=0.0, max_samples=4096)
+            if first is not None:
+                rows, stamps = [first, *rows], [at, *stamps]
             self._compare_clocks()
         except self._lsl.LostError as error:
             raise DeviceError(
