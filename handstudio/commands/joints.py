@@ -74,13 +74,13 @@ def told(found: JointStudy) -> dict[str, Any]:
     return {
         "terminals": [found.upper, found.lower],
         "frames": found.frames,
-        "bend_rad": found.bend_rad,
-        "ok": found.ok,
+        "bend_rad": float(found.bend_rad),
+        "ok": bool(found.ok),
         "joints": {name: _told(each) for name, each in found.found.items()},
         "refused": {name: _words(error) for name, error in found.refused.items()},
         "axis_classes": found.class_counts.tolist(),
         "findings": [
-            {"kind": f.kind, "track": f.track, "amount": f.amount, "made_good": f.made_good}
+            {"kind": f.kind, "track": f.track, "amount": float(f.amount), "made_good": f.made_good}
             | _words(said(f))
             for f in found.findings
         ],
@@ -96,8 +96,8 @@ def _told(found: Found) -> dict[str, Any]:
         "p_lower_m": estimate.p_lower.tolist(),
         "p_lower_covariance_m2": estimate.lower_covariance.tolist(),
         "axis_upper": estimate.axis_upper.tolist(),
-        "axis_sd_rad": estimate.axis_sd_rad,
-        "apart_m": found.apart_m,
+        "axis_sd_rad": float(estimate.axis_sd_rad),
+        "apart_m": float(found.apart_m),
         "frames": estimate.frames,
         "from_upper_m": found.from_upper_m.tolist(),
     }

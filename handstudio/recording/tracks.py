@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 from jaxtyping import Float, Int64
 
 from handstudio.arrays import Array
@@ -116,8 +114,11 @@ def _from_csv(path: Path) -> tuple[Track, ...]:
 
 
 def _table(path: Path) -> dict[str, Array]:
+    import pyarrow as pa  # noqa: PLC0415 - takes its time to load
+    from pyarrow import csv  # noqa: PLC0415
+
     try:
-        table = pyarrow.csv.read_csv(path)
+        table = csv.read_csv(path)
         return {
             name: np.asarray(table[name].cast(pa.float64()).to_numpy(), dtype=float)
             for name in table.column_names

@@ -115,8 +115,7 @@ def pair_of(
     if doubted is not None:
         seen = seen & ~doubted
     at_rest, used = rest & seen, moving & seen
-    _enough(at_rest, LEAST_REST, "straight", "Hold the finger straight for 3 s in sight first.")
-    _enough(used, LEAST_FRAMES, "bent", "Bend it for 20 s, both terminals in sight.")
+    _enough(at_rest, used)
     q, t = seen_from(
         upper.q_room_terminal,
         upper.t_room_terminal,
@@ -161,13 +160,20 @@ def _seen(track: Track) -> Array:
     return np.asarray(both & (track.quality > 0.0))
 
 
-def _enough(used: Array, least: int, what: str, remedy: str) -> None:
-    if np.count_nonzero(used) < least:
+def _enough(at_rest: Array, used: Array) -> None:
+    if np.count_nonzero(at_rest) < LEAST_REST:
         raise TrackError(
-            "Both terminals are seen in {count} frames while the finger is {what}; {least} are "
+            "Both terminals are seen in {count} frames while the finger is straight; {least} are "
             "needed.",
-            remedy,
+            "Hold the finger straight for 3 s first, both terminals in sight.",
+            count=int(np.count_nonzero(at_rest)),
+            least=LEAST_REST,
+        )
+    if np.count_nonzero(used) < LEAST_FRAMES:
+        raise TrackError(
+            "Both terminals are seen in {count} frames while the finger is bent; {least} are "
+            "needed.",
+            "Bend it for 20 s, both terminals in sight.",
             count=int(np.count_nonzero(used)),
-            what=what,
-            least=least,
+            least=LEAST_FRAMES,
         )
