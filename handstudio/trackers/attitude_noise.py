@@ -15,6 +15,8 @@ Fuller, Measurement Error Models, 1987, worked out for these equations).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float
 
@@ -69,7 +71,32 @@ def seeming(
     return np.asarray(attitude_variance(pair) * total)
 
 
-def told(square: Float[Array, "k k"], seems: Float[Array, "k k"]) -> Float[Array, "k k"]:
-    """What equations tell in truth: symmetric, and never less than nothing."""
-    power, directions = np.linalg.eigh(square - 0.5 * (seems + seems.T))
-    return np.asarray((directions * np.maximum(power, 0.0)) @ directions.T)
+class Equations(NamedTuple):
+    """Normal equations: sums of squares of slopes, and of slopes times values."""
+
+    square: Array
+    right: Array
+
+
+def solved(
+    data: Equations, seems: Float[Array, "k k"], known: Equations, start: Float[Array, " k"]
+) -> tuple[Float[Array, " k"], Float[Array, "k k"]]:
+    """Unknowns and their covariance from weighted data, less what only seems so, and what is known.
+
+    Directions in which the data seem to tell no more than noise would make them seem are left
+    to what is known: a hinge's place along its axis.
+
+    Args:
+        data: Of the frames.
+        seems: What noise adds to their squares.
+        known: Of what is known before.
+        start: Unknowns that agree with it.
+    """
+    true = data.square - 0.5 * (seems + seems.T)
+    power, directions = np.linalg.eigh(true)
+    noise = np.einsum("ik,ij,jk->k", directions, seems, directions)
+    told = directions[:, power > np.maximum(noise, 0.0)]
+    only = told @ told.T
+    covariance = np.linalg.inv(only @ true @ only + known.square)
+    left = only @ (data.right - (data.square - seems) @ start)
+    return start + covariance @ (left + known.right - known.square @ start), covariance

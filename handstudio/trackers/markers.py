@@ -53,7 +53,7 @@ def cluster_of(
     whole = np.isfinite(t_room_marker).all(axis=(1, 2))
     if len(markers) < LEAST_MARKERS or not whole.any():
         raise TrackError(
-            "{name}: {count} markers, all seen together in {frames} frames; 3 markers and 1 frame are "
+            "{name}: {count} markers, seen together in {frames} frames; 3 markers, 1 frame are "
             "needed.",
             "Put three or more markers on it, not in a row, and show them all for a moment.",
             name=name,

@@ -11,7 +11,7 @@ import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.maths import so3
-from handstudio.trackers.attitude_noise import seeming, told
+from handstudio.trackers.attitude_noise import Equations, seeming, solved
 from handstudio.trackers.estimate import (
     UNSEEN_SD_M,
     JointEstimate,
@@ -38,9 +38,9 @@ def centre(pair: Pair, plane: Plane | None = None) -> JointEstimate:
     for _ in range(3):  # what is left tells how much the ties count
         left = pair.t_upper_lower - rows @ x
         precision = _precision(left)
-        right = precision * np.einsum("nki,nk->i", rows, pair.t_upper_lower) + tie @ guess
-        x = np.linalg.solve(precision * (square - noise) + tie, right)
-        covariance = np.linalg.inv(precision * told(square, noise) + tie)
+        right = np.einsum("nki,nk->i", rows, pair.t_upper_lower)
+        data = Equations(precision * square, precision * right)
+        x, covariance = solved(data, precision * noise, Equations(tie, tie @ guess), guess)
     axis, sd = _axis(axis, square, left)
     zero = np.zeros(3)
     return JointEstimate(
