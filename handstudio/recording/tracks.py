@@ -18,9 +18,11 @@ from jaxtyping import Float, Int64
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.recording.marker_files import read_c3d, read_trc, read_tsv
-from handstudio.trackers.columns import GUIDE, tracks_of
+from handstudio.trackers.columns import tracks_of
 from handstudio.trackers.markers import cluster_of, track_of
 from handstudio.trackers.track import Track
+
+_GUIDE = "docs/trackers.md shows the columns."
 
 
 def read_tracks(
@@ -127,7 +129,7 @@ def _table(path: Path) -> dict[str, Array]:
     except (pa.ArrowException, OSError) as error:
         raise TrackError(
             "{path}: cannot be read: {error}.",
-            GUIDE,
+            _GUIDE,
             path=path,
             error=str(error).partition("\n")[0].rstrip("."),
         ) from error

@@ -18,7 +18,7 @@ from handstudio.errors import TrackError
 from handstudio.maths import so3
 from handstudio.trackers.track import Track
 
-GUIDE = "docs/trackers.md shows the columns."
+_GUIDE = "docs/trackers.md shows the columns."
 
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _PLACES = [f"_x_{unit}" for unit in _METRES]
@@ -45,7 +45,7 @@ def tracks_of(
     ]
     if not names:
         raise TrackError(
-            "{where}: no column such as NAME_x_mm, so it has no terminal.", GUIDE, where=where
+            "{where}: no column such as NAME_x_mm, so it has no terminal.", _GUIDE, where=where
         )
     return tuple(_terminal(where, table, name, time_us) for name in names)
 
@@ -85,7 +85,7 @@ def _columns(where: object, table: Mapping[str, Array], names: list[str]) -> Arr
     if missing:
         raise TrackError(
             "{where}: the column {name} is missing or holds no numbers.",
-            GUIDE,
+            _GUIDE,
             where=where,
             name=missing[0],
         )
