@@ -86,7 +86,7 @@ def track_of(
     Raises:
         TrackError: in most frames the markers are the cluster's mirror image.
     """
-    seen = np.isfinite(t_room_marker).all(axis=2)
+    seen: Array = np.asarray(np.isfinite(t_room_marker).all(axis=2))
     enough = _spans(cluster.t_cluster_marker, seen)
     n = len(time_us)
     t, q, quality = np.full((n, 3), np.nan), np.full((n, 4), np.nan), np.zeros(n)
