@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int64
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3
+from handstudio.trackers.findings import seen_at
 from handstudio.trackers.poses import mean_attitude, seen_from
 from handstudio.trackers.track import Track
 
@@ -111,7 +112,7 @@ def pair_of(
             upper=upper.name,
             lower=lower.name,
         )
-    seen = _seen(upper) & _seen(lower)
+    seen = seen_at(upper) & seen_at(lower)
     if doubted is not None:
         seen = seen & ~doubted
     at_rest, used = rest & seen, moving & seen
@@ -152,12 +153,6 @@ def joined(takes: Sequence[Pair]) -> Pair:
         rest_t_upper_lower=np.mean([take.rest_t_upper_lower for take in takes], axis=0),
         rest_q_room_upper=mean_attitude(np.stack([take.rest_q_room_upper for take in takes])),
     )
-
-
-def _seen(track: Track) -> Array:
-    both = np.isfinite(track.t_room_terminal).all(axis=1)
-    both &= np.isfinite(track.q_room_terminal).all(axis=1)
-    return np.asarray(both & (track.quality > 0.0))
 
 
 def _enough(at_rest: Array, used: Array) -> None:
