@@ -27,6 +27,7 @@ class Fate(IntEnum):
     JUMPED = 3  # too far from where the rest says that it is
     MIRRORED = 4  # on the other side of the transmitter: taken after mirroring
     AFRESH = 5  # it stayed where it jumped to: begun anew from it
+    TURNED = 6  # its place fits and was taken, its attitude does not
 
 
 def squared(innovation: Float[Array, " m"], covariance: Float[Array, "m m"]) -> float:

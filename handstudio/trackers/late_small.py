@@ -1,7 +1,7 @@
 """One rotation at a time, in plain floats: for a loop that goes from sample to sample.
 
-As `maths.so3`, scalar first, but for single quaternions and vectors as tuples: the way through numpy
-costs ten times what is done there.
+As `maths.so3`, scalar first, but for single quaternions and vectors as tuples: the way through
+numpy costs ten times what is done there.
 """
 
 from __future__ import annotations
