@@ -111,3 +111,7 @@ class SettingsError(HandstudioError):
 
 class CalibrationError(HandstudioError):
     """A calibration cannot be computed from what was recorded, or cannot be read."""
+
+
+class TrackError(HandstudioError):
+    """What a tracker told cannot be read, or no joint can be found from it."""
