@@ -26,6 +26,7 @@ from handstudio.commands.checking import check
 from handstudio.commands.grasping import grasps
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
+from handstudio.commands.tracking import add_track
 from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
@@ -387,6 +388,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "trim": sharing.trim,
     "share": sharing.share,
     "add": sharing.add,
+    "add-track": add_track,
     "bin": keeping.bin,
     "restore": keeping.restore,
     "subjects": keeping.subjects,

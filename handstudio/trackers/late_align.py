@@ -9,6 +9,7 @@ assumed of the mounting: a terminal may sit upside down.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int64
@@ -24,6 +25,7 @@ _TURN_S = 0.25  # rotations that are compared
 _LEAST_TURN = np.deg2rad(5.0)
 _LEAST_SECOND = 0.15  # of the turning about the first axis: less tells no attitude
 _SURE = 0.5  # correlation of speeds below which the two did not move together
+_LEAST_OVERLAP = 300  # steps of the grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +67,12 @@ def align(
             the two did not move together.
     """
     seen = np.isfinite(track.q_room_terminal).all(axis=-1)
-    if seen.sum() < 50:
+    if seen.sum() < 50 or len(time_us) < 50:
         raise CalibrationError(
-            "The tracker tells only {count} attitudes of {name}.",
-            "Record at least ten seconds in which the terminal is seen.",
-            count=int(seen.sum()),
+            "Tracker and sensor tell only {count} attitudes of {name}.",
+            "Record at least ten seconds in which the terminal is seen and the sensor was at rest "
+            "before.",
+            count=min(int(seen.sum()), len(time_us)),
             name=track.name,
         )
     sensor_s, told_s = time_us * 1e-6, track.time_us[seen] * 1e-6
@@ -82,14 +85,13 @@ def align(
             name=track.name,
             found=correlation,
         )
-    at = told_s - delay
-    inside = (at >= sensor_s[0]) & (at <= sensor_s[-1])
-    q_sensor, q_told, at = (
-        attitude_at(sensor_s, q_world_sensor, at[inside]),
-        q_told[inside],
-        at[inside],
-    )
-    q_mount = _mount(at, q_sensor, q_told, track.name)
+    sensor, told = (sensor_s, q_world_sensor), (told_s, q_told)
+    q_mount = _mount(sensor, told, delay, track.name)
+    delay = _refined(sensor, told, delay, q_mount)
+    q_mount = _mount(sensor, told, delay, track.name)
+    inside = _inside(sensor_s, told_s - delay)
+    q_sensor = attitude_at(sensor_s, q_world_sensor, told_s[inside] - delay)
+    q_told = q_told[inside]
     q_each = so3.multiply(q_told, so3.conjugate(so3.multiply(q_sensor, q_mount)))
     q_room_world = _mean(q_each)
     off = so3.angle_between(q_each, q_room_world)
@@ -120,55 +122,79 @@ def _delay(
 ) -> tuple[float, float]:
     """The shift at which speeds of turning agree best, and how well they do."""
     step = 1.0 / _GRID_HZ
-    grid = np.arange(told_s[0], told_s[-1], step)
-    # where poses are missing, the way between the two around them says nothing
-    nearest = np.searchsorted(told_s, grid).clip(1, len(told_s) - 1)
-    sound = told_s[nearest] - told_s[nearest - 1] < 3.0 * np.median(np.diff(told_s))
-    grid = grid[sound]
-    speed = _speed(told_s, q_told, grid)
-    lags = np.arange(search_s[0], search_s[1] + 0.5 * step, step)
-    fine = _speed_table(sensor_s, q_sensor, grid[0] - lags[-1], grid[-1] - lags[0])
-    found = np.array([_agreement(fine, grid - lag, speed) for lag in lags])
-    k = int(np.argmax(found))
+    sensor, told = _even_speeds(sensor_s, q_sensor), _even_speeds(told_s, q_told)
+    agreement = _agreement(sensor[1:], told[1:])
+    # the k-th says how well the sensor agrees with what was told so many steps later than at -n + 1
+    lags = told[0] - sensor[0] + step * (np.arange(len(agreement)) - (len(sensor[1]) - 1))
+    agreement[(lags < search_s[0] - 0.5 * step) | (lags > search_s[1] + 0.5 * step)] = -1.0
+    k = int(np.argmax(agreement))
     best = float(lags[k])
-    if 0 < k < len(lags) - 1:  # the top of the parabola through three
-        left, top, right = found[k - 1 : k + 2]
+    if 0 < k < len(lags) - 1 and min(agreement[k - 1], agreement[k + 1]) > -1.0:
+        left, top, right = agreement[k - 1 : k + 2]  # the top of the parabola through three
         bend = left - 2.0 * top + right
         best += float(0.5 * (left - right) / bend * step) if bend < 0.0 else 0.0
-    return best, float(found[k])
+    return best, float(max(agreement[k], 0.0))
 
 
-def _speed_table(sensor_s: Array, q: Array, first: float, last: float) -> tuple[Array, Array]:
-    at = np.arange(max(first, sensor_s[0]), min(last, sensor_s[-1]), 0.5 / _GRID_HZ)
-    return at, _speed(sensor_s, q, at)
+def _even_speeds(time_s: Array, q: Array) -> tuple[float, Array, Array]:
+    """Speeds of turning at even steps: the first instant, the speeds, and where they are known."""
+    grid = np.arange(time_s[0], time_s[-1], 1.0 / _GRID_HZ)
+    # where samples are missing, the way between the two around them says nothing
+    after = np.searchsorted(time_s, grid).clip(1, len(time_s) - 1)
+    known = time_s[after] - time_s[after - 1] < 3.0 * np.median(np.diff(time_s))
+    return float(grid[0]), np.where(known, _speed(time_s, q, grid), 0.0), known.astype(float)
 
 
-def _agreement(table: tuple[Array, Array], at_s: Array, speed: Array) -> float:
-    at, sensor = table
-    if len(at) < 2:
-        return 0.0
-    inside = (at_s >= at[0]) & (at_s <= at[-1])
-    if inside.sum() < 100:
-        return 0.0
-    a, b = np.interp(at_s[inside], at, sensor), speed[inside]
-    scatter = float(np.std(a) * np.std(b))
-    return float(np.mean((a - a.mean()) * (b - b.mean())) / scatter) if scatter > 0.0 else 0.0
+def _agreement(sensor: tuple[Array, Array], told: tuple[Array, Array]) -> Array:
+    """Correlation of speeds at every shift, over what both know; 0 where that is too little."""
+    (a, knows_a), (b, knows_b) = sensor, told
+    size = len(a) + len(b) - 1
+    room = 1 << (size - 1).bit_length()
+
+    def against(x: Array, y: Array) -> Array:
+        both = np.fft.rfft(y, room) * np.fft.rfft(x[::-1], room)
+        return np.asarray(np.fft.irfft(both, room)[:size])
+
+    count = np.maximum(np.rint(against(knows_a, knows_b)), 1.0)
+    mean_a, mean_b = against(a, knows_b) / count, against(knows_a, b) / count
+    covariance = against(a, b) / count - mean_a * mean_b
+    spread_a = against(a * a, knows_b) / count - mean_a**2
+    spread_b = against(knows_a, b * b) / count - mean_b**2
+    sound = (count >= _LEAST_OVERLAP) & (spread_a > 1e-6) & (spread_b > 1e-6)
+    scatter = np.sqrt(np.where(sound, spread_a * spread_b, 1.0))
+    return np.where(sound, covariance / scatter, 0.0)
 
 
-def _mount(at_s: Array, q_sensor: Array, q_terminal: Array, name: str) -> Array:
-    """How the terminal sits: rotations of both over a while are about the same axes."""
-    later = np.searchsorted(at_s, at_s + _TURN_S)
-    first = np.flatnonzero(later < len(at_s))
+_Attitudes: TypeAlias = tuple[Array, Array]
+"""Instants [s] and attitudes at them."""
+
+
+def _inside(time_s: Array, at_s: Array) -> Array:
+    return np.asarray((at_s >= time_s[0]) & (at_s <= time_s[-1]))
+
+
+def _turns(sensor: _Attitudes, told: _Attitudes, delay: float) -> tuple[Array, Array, Array]:
+    """Rotations over a while, as terminal and sensor saw them, and from which pose on."""
+    told_s, q_told = told
+    later = np.searchsorted(told_s, told_s + _TURN_S)
+    first = np.flatnonzero(later < len(told_s))
     later = later[first]
-    first, later = (
-        first[at_s[later] - at_s[first] < 1.5 * _TURN_S],
-        later[at_s[later] - at_s[first] < 1.5 * _TURN_S],
+    usual = (told_s[later] - told_s[first] < 1.5 * _TURN_S) & _inside(
+        sensor[0], told_s[first] - delay
     )
-    turns = [
-        so3.log(so3.multiply(so3.conjugate(q[first]), q[later])) for q in (q_sensor, q_terminal)
-    ]
-    enough = np.linalg.norm(turns[0], axis=-1) > _LEAST_TURN
-    a, b = turns[0][enough], turns[1][enough]
+    usual &= _inside(sensor[0], told_s[later] - delay)
+    first, later = first[usual], later[usual]
+    by_sensor = [attitude_at(*sensor, told_s[which] - delay) for which in (first, later)]
+    pairs = (q_told[first], q_told[later]), by_sensor
+    seen, felt = (so3.log(so3.multiply(so3.conjugate(a), b)) for a, b in pairs)
+    return seen, felt, first
+
+
+def _mount(sensor: _Attitudes, told: _Attitudes, delay: float, name: str) -> Array:
+    """How the terminal sits: rotations of both over a while are about the same axes."""
+    seen, felt, _ = _turns(sensor, told, delay)
+    enough = np.linalg.norm(felt, axis=-1) > _LEAST_TURN
+    a, b = felt[enough], seen[enough]
     u, size, vt = np.linalg.svd(a.T @ b if len(a) else np.zeros((3, 3)))
     if not size[1] > _LEAST_SECOND**2 * size[0] or len(a) < 20:
         raise CalibrationError(
@@ -178,6 +204,29 @@ def _mount(at_s: Array, q_sensor: Array, q_terminal: Array, name: str) -> Array:
         )
     signs = np.array([1.0, 1.0, np.linalg.det(u @ vt)])
     return np.asarray(so3.from_matrix((u * signs) @ vt))
+
+
+def _refined(sensor: _Attitudes, told: _Attitudes, delay: float, q_mount: Array) -> float:
+    """The delay at which rotations agree as vectors: steps of Gauss and Newton.
+
+    Speeds alone are drawn aside where a filter turns an attitude right while little moves: their
+    differences count less the larger they are (weights of Cauchy).
+    """
+    h = 0.5 / _GRID_HZ
+    for _ in range(5):
+        seen, felt, first = _turns(sensor, told, delay)
+        off = so3.rotate(q_mount, seen) - felt
+        sides = [_turns(sensor, told, delay + d) for d in (h, -h)]
+        both = np.intersect1d(np.intersect1d(first, sides[0][2]), sides[1][2])
+        up, down = (felt_there[np.isin(at, both)] for _, felt_there, at in sides)
+        slope, off = (up - down) / (2.0 * h), off[np.isin(first, both)]
+        square = np.sum(off * off, axis=-1, keepdims=True)
+        weight = 1.0 / (1.0 + square / (4.0 * max(float(np.median(square)), 1e-12)))
+        power = float(np.sum(weight * slope * slope))
+        if not power > 0.0:
+            break
+        delay += float(np.clip(np.sum(weight * slope * off) / power, -0.02, 0.02))
+    return delay
 
 
 def _mean(q: Array) -> Array:
