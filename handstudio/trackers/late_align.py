@@ -23,7 +23,7 @@ _GRID_HZ = 100.0
 _SPEED_S = 0.04  # speeds of turning are means of so long
 _TURN_S = 0.25  # rotations that are compared
 _LEAST_TURN = np.deg2rad(5.0)
-_LEAST_SECOND = 0.15  # of the turning about the first axis: less tells no attitude
+_LEAST_SECOND = 0.03  # [rad] of these about a second axis, rms: noise of a tracker is a tenth
 _SURE = 0.5  # correlation of speeds below which the two did not move together
 _LEAST_OVERLAP = 300  # steps of the grid
 
@@ -196,7 +196,7 @@ def _mount(sensor: _Attitudes, told: _Attitudes, delay: float, name: str) -> Arr
     enough = np.linalg.norm(felt, axis=-1) > _LEAST_TURN
     a, b = felt[enough], seen[enough]
     u, size, vt = np.linalg.svd(a.T @ b if len(a) else np.zeros((3, 3)))
-    if not size[1] > _LEAST_SECOND**2 * size[0] or len(a) < 20:
+    if len(a) < 20 or not size[1] > len(a) * _LEAST_SECOND**2:
         raise CalibrationError(
             "The segment that {name} sits on turned too little, or about one axis only.",
             "Record some seconds in which it turns about several axes, 30 degrees and more.",
