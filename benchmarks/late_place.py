@@ -58,7 +58,7 @@ def _followed(
     if fastest_m_s is not None:
         at = np.arange(0.0, performed.duration_s, 0.01)
         _, segments = hand_at(subject(person), performed, at, World())
-        speed = _length(segments.v[:, SEGMENTS.index("hand")]).max()
+        speed = _length(segments.v[:, SEGMENTS.index("middle_proximal")]).max()  # its knuckle
         performed = stretched(performed, max(1.0, float(speed) / fastest_m_s))
     return follow(trial, performed)
 
