@@ -75,8 +75,9 @@ def bent_joint(
             base="hand",
         )
         rest, moving = (during(told, name) for name in ("straight", f"{joint}:flexion"))
-        pair = pair_of(*told.tracks, rest, moving)
-        used = np.isin(told.tracks[0].time_us, pair.time_us)
+        one, other = told.tracks
+        pair = pair_of(one, other, rest, moving)
+        used = np.isin(one.time_us, pair.time_us)
         upper, lower = (SEGMENTS.index(name) for name in segments)
         pairs.append(pair)
         bones.append(told.q_room_segment[used][:, [upper, lower]])

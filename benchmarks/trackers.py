@@ -23,6 +23,7 @@ from benchmarks.bent_joints import bent_joint, figures_of, skin_of_strength, sum
 from benchmarks.coil_range import coil_range, show_range
 from handstudio.errors import TrackError
 from handstudio.shell import out, print_table
+from handstudio.simulation.trackers import TrackerErrors
 from handstudio.trackers.methods import METHODS, estimated
 from handstudio.trackers.steady_axis import steady_axis
 
@@ -74,6 +75,8 @@ def joints(numbers: Iterable[int]) -> dict[str, Any]:
     mocks, mock_shares = by_method(numbers, mock=True)
     _show(f"Index DIP of {len(numbers)} people", fingers, shares)
     _show(f"A hinge of wood, {len(numbers)} of them", mocks, mock_shares)
+    unknocked, unknocked_shares = by_method(numbers, errors=TrackerErrors(), methods=KEYS.values())
+    _show("The fingers, terminals neither tugged at nor knocked", unknocked, unknocked_shares)
     sensitivity = {
         what: by_method(numbers, skin=skin_of_strength(**strengths), methods=("rolling",))[0]
         for what, strengths in SENSITIVITY.items()
@@ -92,6 +95,7 @@ def joints(numbers: Iterable[int]) -> dict[str, Any]:
         "mock_axis_shares": mock_shares,
         "methods": fingers,
         "mock_methods": mocks,
+        "unknocked_methods": unknocked,
         "sensitivity": sensitivity,
     }
 

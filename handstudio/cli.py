@@ -24,6 +24,7 @@ from handstudio.commands.aligning import aligned
 from handstudio.commands.arguments import Json, Sessions, TakeFile
 from handstudio.commands.checking import check
 from handstudio.commands.grasping import grasps
+from handstudio.commands.joints import joints
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
 from handstudio.commands.tracking import add_track
@@ -383,6 +384,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "mirror": calibration_commands.mirror,
     "calibrate-sensors": calibration_commands.calibrate_sensors,
     "noise": noise,
+    "joints": joints,
     "takes": keeping.takes,
     "rename": keeping.rename,
     "trim": sharing.trim,

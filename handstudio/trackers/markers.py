@@ -53,7 +53,8 @@ def cluster_of(
     whole = np.isfinite(t_room_marker).all(axis=(1, 2))
     if len(markers) < LEAST_MARKERS or not whole.any():
         raise TrackError(
-            "{name}: {count} markers, seen together in {frames} frames; three and one are needed.",
+            "{name}: {count} markers, seen together in {frames} frames; 3 markers, 1 frame are "
+            "needed.",
             "Put three or more markers on it, not in a row, and show them all for a moment.",
             name=name,
             count=len(markers),
@@ -85,9 +86,8 @@ def track_of(
     Raises:
         TrackError: in most frames the markers are the cluster's mirror image.
     """
-    seen = np.isfinite(t_room_marker).all(axis=2)
-    enough = seen.sum(axis=1) >= LEAST_MARKERS
-    enough &= _spans(cluster.t_cluster_marker, seen, enough)
+    seen: Array = np.asarray(np.isfinite(t_room_marker).all(axis=2))
+    enough = _spans(cluster.t_cluster_marker, seen)
     n = len(time_us)
     t, q, quality = np.full((n, 3), np.nan), np.full((n, 4), np.nan), np.zeros(n)
     if enough.any():
@@ -118,11 +118,12 @@ def _laid(
     return so3.from_matrix(turned), t, misfit
 
 
-def _spans(shape: Array, seen: Array, enough: Array) -> Bool[Array, " n"]:
-    """Whether the markers that are seen lie well off one line."""
-    spans = np.zeros(len(seen), dtype=bool)
-    for which in np.unique(seen[enough], axis=0):
-        spans[(seen == which).all(axis=1)] = _thickness(shape[which]) >= _THINNEST_M
+def _spans(shape: Array, seen: Array) -> Bool[Array, " n"]:
+    """Whether enough markers are seen, well off one line."""
+    spans: Array = np.zeros(len(seen), dtype=bool)
+    for which in np.unique(seen, axis=0):
+        if np.count_nonzero(which) >= LEAST_MARKERS:
+            spans[(seen == which).all(axis=1)] = _thickness(shape[which]) >= _THINNEST_M
     return spans
 
 

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int64
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3
+from handstudio.trackers.findings import seen_at
 from handstudio.trackers.poses import mean_attitude, seen_from
 from handstudio.trackers.track import Track
 
@@ -111,12 +112,11 @@ def pair_of(
             upper=upper.name,
             lower=lower.name,
         )
-    seen = _seen(upper) & _seen(lower)
+    seen = seen_at(upper) & seen_at(lower)
     if doubted is not None:
         seen = seen & ~doubted
     at_rest, used = rest & seen, moving & seen
-    _enough(at_rest, LEAST_REST, "straight", "Hold the finger straight for 3 s in sight first.")
-    _enough(used, LEAST_FRAMES, "bent", "Bend it for 20 s, both terminals in sight.")
+    _enough(at_rest, used)
     q, t = seen_from(
         upper.q_room_terminal,
         upper.t_room_terminal,
@@ -155,19 +155,20 @@ def joined(takes: Sequence[Pair]) -> Pair:
     )
 
 
-def _seen(track: Track) -> Array:
-    both = np.isfinite(track.t_room_terminal).all(axis=1)
-    both &= np.isfinite(track.q_room_terminal).all(axis=1)
-    return np.asarray(both & (track.quality > 0.0))
-
-
-def _enough(used: Array, least: int, what: str, remedy: str) -> None:
-    if np.count_nonzero(used) < least:
+def _enough(at_rest: Array, used: Array) -> None:
+    if np.count_nonzero(at_rest) < LEAST_REST:
         raise TrackError(
-            "Both terminals are seen in {count} frames while the finger is {what}; {least} are "
+            "Both terminals are seen in {count} frames while the finger is straight; {least} are "
             "needed.",
-            remedy,
+            "Hold the finger straight for 3 s first, both terminals in sight.",
+            count=int(np.count_nonzero(at_rest)),
+            least=LEAST_REST,
+        )
+    if np.count_nonzero(used) < LEAST_FRAMES:
+        raise TrackError(
+            "Both terminals are seen in {count} frames while the finger is bent; {least} are "
+            "needed.",
+            "Bend it for 20 s, both terminals in sight.",
             count=int(np.count_nonzero(used)),
-            what=what,
-            least=least,
+            least=LEAST_FRAMES,
         )

@@ -19,13 +19,13 @@ own path instead of one component of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3
+from handstudio.trackers.attitude_noise import Equations, seeming, solved
 from handstudio.trackers.estimate import JointEstimate, in_lower, independent, rest_place
 from handstudio.trackers.pair import Pair
 from handstudio.trackers.plane import Plane
@@ -94,8 +94,12 @@ def rolling(pair: Pair, plane: Plane | None = None, known: Known | None = None) 
         weight = new
     data = _precision_of(left, weight)
     square, right = _sums(rows, pair, weight)
-    covariance = np.linalg.inv(data * square + prior.square)
-    x = covariance @ (data * right + prior.right)
+    x, covariance = solved(
+        Equations(data * square, data * right),
+        data * seeming(pair, axis, beyond, weight),
+        prior,
+        np.linalg.lstsq(prior.square, prior.right, rcond=1e-12)[0],
+    )
     return JointEstimate(
         "rolling",
         x[0:3],
@@ -136,14 +140,7 @@ def _rows(pair: Pair, beyond: Array) -> Array:
     return rows
 
 
-class _Observed(NamedTuple):
-    """What is known, as sums of weighted rows, and of rows times values."""
-
-    square: Array
-    right: Array
-
-
-def _prior(pair: Pair, axis: Array, middle: Array, known: Known) -> _Observed:
+def _prior(pair: Pair, axis: Array, middle: Array, known: Known) -> Equations:
     to_lower = so3.conjugate(pair.rest_q_upper_lower)
     along = pair.rest_t_upper_lower - axis * (axis @ pair.rest_t_upper_lower)
     along = along / np.linalg.norm(along)
@@ -170,10 +167,10 @@ def _prior(pair: Pair, axis: Array, middle: Array, known: Known) -> _Observed:
         for direction in directions:
             add(block, direction, 0.0, known.other_sd_m)
     weighted = np.array(rows).T / np.array(sds) ** 2
-    return _Observed(weighted @ np.array(rows), weighted @ np.array(values))
+    return Equations(weighted @ np.array(rows), weighted @ np.array(values))
 
 
-def _left(rows: Array, pair: Pair, weight: Array, known: _Observed) -> Array:
+def _left(rows: Array, pair: Pair, weight: Array, known: Equations) -> Array:
     """Residuals of places, with what is known counting as against frames of a tenth of a mm."""
     square, right = _sums(rows, pair, weight)
     normal = square + _FRAME_M**2 * known.square

@@ -15,7 +15,7 @@ def said(finding: TrackFinding) -> TrackError:  # noqa: PLR0911 - a list
         case "no_clock":
             return TrackError(
                 "{name}: {share:.0f} % of its instants are not later than the one before.",
-                "Export it with a time column in seconds, or say its rate.",
+                "Export it with a time column in seconds.",
                 name=name,
                 share=100.0 * amount,
             )

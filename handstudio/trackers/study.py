@@ -18,7 +18,7 @@ from handstudio.trackers.estimate import (
     functional_axis,
     independent,
 )
-from handstudio.trackers.findings import TrackFinding, checked_pair, seen_at
+from handstudio.trackers.findings import TrackFinding, checked_pair
 from handstudio.trackers.methods import METHODS, Method, estimated
 from handstudio.trackers.pair import Pair, pair_of
 from handstudio.trackers.poses import placed
@@ -143,11 +143,6 @@ def bend_of(pair: Pair) -> float:
     flexion = functional_axis(pair)[2]
     low, high = np.percentile(flexion, [5.0, 95.0])
     return float(high - low)
-
-
-def seen_share(upper: Track, lower: Track) -> float:
-    """Share of instants at which both terminals were seen."""
-    return float(np.mean(seen_at(upper) & seen_at(lower)))
 
 
 def _found(pair: Pair, estimate: JointEstimate) -> Found:

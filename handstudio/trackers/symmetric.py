@@ -11,6 +11,7 @@ import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.maths import so3
+from handstudio.trackers.attitude_noise import Equations, seeming, solved
 from handstudio.trackers.estimate import (
     UNSEEN_SD_M,
     JointEstimate,
@@ -31,13 +32,16 @@ def centre(pair: Pair, plane: Plane | None = None) -> JointEstimate:
     x = guess
     tie = np.eye(6) / UNSEEN_SD_M**2
     square = np.einsum("nki,nkj->ij", rows, rows)
+    axis = functional_axis(pair)[0]
+    noise = seeming(pair, axis, np.zeros(len(pair)), np.ones(len(pair)))[:6, :6]
     covariance = tie
     for _ in range(3):  # what is left tells how much the ties count
         left = pair.t_upper_lower - rows @ x
-        normal = _precision(left) * square + tie
-        right = _precision(left) * np.einsum("nki,nk->i", rows, pair.t_upper_lower) + tie @ guess
-        x, covariance = np.linalg.solve(normal, right), np.linalg.inv(normal)
-    axis, sd = _axis(pair, square, left)
+        precision = _precision(left)
+        right = np.einsum("nki,nk->i", rows, pair.t_upper_lower)
+        data = Equations(precision * square, precision * right)
+        x, covariance = solved(data, precision * noise, Equations(tie, tie @ guess), guess)
+    axis, sd = _axis(axis, square, left)
     zero = np.zeros(3)
     return JointEstimate(
         "symmetric",
@@ -64,12 +68,11 @@ def _precision(left: Array) -> float:
     return independent(left) / n / spread
 
 
-def _axis(pair: Pair, square: Array, left: Array) -> tuple[Array, float]:
+def _axis(flexion: Array, square: Array, left: Array) -> tuple[Array, float]:
     """Upper half of the direction that is told least, along the mean flexion axis; its sd."""
     power, vectors = np.linalg.eigh(square)
     axis = vectors[:3, 0] / np.linalg.norm(vectors[:3, 0])
-    flexion = functional_axis(pair)[0]
-    turned = float(np.sqrt(power[1] / len(pair)))
-    spread = float(np.sqrt(power[0] / len(pair)))
+    turned = float(np.sqrt(power[1] / len(left)))
+    spread = float(np.sqrt(max(power[0], 0.0) / len(left)))
     sd = spread / max(turned, 1e-9) / np.sqrt(independent(left))
     return np.asarray(axis if axis @ flexion >= 0.0 else -axis), sd
