@@ -120,6 +120,7 @@ class Followed:
     compared: Array = field(repr=False)  # which instants
     own: HandFit | None = None  # the hand as a course before found it
     q_segment_functional: Array | None = field(default=None, repr=False)  # true axes of that course
+    runs: tuple[ImuSamples, ...] = field(default=(), repr=False)  # what the sensors told
 
     @property
     def fit(self) -> HandFit:
@@ -180,7 +181,7 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
     time_s = truth.time_us * 1e-6
     compared = time_s >= _begins_s(performed)
     motion = pipeline.join(motions)
-    return Followed(worn, setup, performed, truth, motion, compared, own, functional)
+    return Followed(worn, setup, performed, truth, motion, compared, own, functional, tuple(runs))
 
 
 def _smoothed(setup: Setup, runs: list[ImuSamples]) -> list[pipeline.Motion]:

@@ -27,6 +27,7 @@ from handstudio.commands.grasping import grasps
 from handstudio.commands.joints import joints
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
+from handstudio.commands.tracking import add_track
 from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
@@ -389,6 +390,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "trim": sharing.trim,
     "share": sharing.share,
     "add": sharing.add,
+    "add-track": add_track,
     "bin": keeping.bin,
     "restore": keeping.restore,
     "subjects": keeping.subjects,

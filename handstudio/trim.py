@@ -26,6 +26,7 @@ from handstudio.recording.naming import file_name, free_path
 from handstudio.recording.notes import Label, Mark, Notes, load_notes, save_notes
 from handstudio.recording.samples_message import encode_samples
 from handstudio.recording.take import FirstState, Take, pack_first_state
+from handstudio.recording.take_track import load_track, save_track
 from handstudio.recording.writer import TakeWriter
 from handstudio.samples import Event, ImuSamples
 from handstudio.stream import EventStream
@@ -72,6 +73,9 @@ def trim(
     target = free_path(take.path.with_name(f"{stem}.mcap"))
     _write(take, target, first, time_s[first:stop], progress or (lambda _share: None))
     _take_notes_along(take.path, target, float(time_s[first]), float(time_s[stop - 1]))
+    kept = load_track(take.path)
+    if kept is not None:  # all of it: the part's time axis is the whole take's
+        save_track(target, kept)
     return target
 
 

@@ -20,7 +20,6 @@ from handstudio.arrays import Array
 from handstudio.export.frames import Frames, blocks, frames_of
 from handstudio.export.part import Part
 from handstudio.export.tables import POINTS, points_mm
-from handstudio.kinematics import pose_of
 
 _BLOCK = 512
 _MOST = 65535  # what sixteen bits hold
@@ -42,8 +41,9 @@ def write(part: Part, file: BinaryIO) -> None:
     for _first, count, motion, rows in blocks(part, frames):
         values = np.full((count, len(POINTS), 4), np.nan, dtype="<f4")
         values[..., 3] = -1.0
-        values[rows, :, :3] = points_mm(pose_of(part.setup, motion.q_world_sensor))
-        values[rows, :, 3] = 0.0
+        places = points_mm(part.pose(motion))
+        values[rows, :, :3] = places
+        values[rows, :, 3] = np.where(np.isfinite(places[..., 0]), 0.0, -1.0)
         file.write(values.tobytes())
     written = frames.count * len(POINTS) * 16
     file.write(b"\0" * (-written % _BLOCK))

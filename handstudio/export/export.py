@@ -43,8 +43,11 @@ def export(
     kind = chosen.content(content, setup.layout)
     motion = cut(source.motion, window or Window())
     start_utc_ns = source.take.header.start_utc_ns
-    part = Part(setup, motion, start_us, start_utc_ns, kind, {}, angles, progress)
+    root = source.root if kind == "positions" else None
+    part = Part(setup, motion, start_us, start_utc_ns, kind, {}, angles, progress, root)
     about = source.about | metadata.of_part(setup, motion, start_us, kind) | chosen.facts(part)
+    if root is not None:
+        about |= metadata.of_root(root, source.take, motion)
     part = replace(part, about=about)
     sidecar = msgspec.json.format(msgspec.json.encode(about))
     with written_whole(target, sidecar) as file:

@@ -14,9 +14,11 @@ from handstudio.arrays import Array
 from handstudio.errors import TakeError
 from handstudio.export import metadata
 from handstudio.hand.angles import Angle
-from handstudio.kinematics import exported_angles
+from handstudio.hand.pose import Pose
+from handstudio.kinematics import exported_angles, pose_of
 from handstudio.pipeline import Motion
 from handstudio.recording.take import Take
+from handstudio.rooted import Root, root_of
 from handstudio.setup import Setup
 
 Content: TypeAlias = Literal[
@@ -50,6 +52,15 @@ class Processed:
         """What every file of it tells; found once, for hash and health need the whole take."""
         return metadata.of_take(self.take, self.setup)
 
+    @cached_property
+    def root(self) -> Root | None:
+        """Where the hand was in a tracker's room, where the take has a track.
+
+        Raises:
+            CalibrationError: by this setup the track cannot be aligned.
+        """
+        return root_of(self.take, self.setup, self.motion)
+
 
 def _nobody(_share: float) -> None:
     pass
@@ -68,6 +79,7 @@ class Part:
         about: What the file tells of itself.
         only: Names of the angles that are wanted; empty: all there are.
         tell: Told the share that is written.
+        root: Where the hand was in a tracker's room, where positions are wanted and that is known.
     """
 
     setup: Setup
@@ -78,12 +90,18 @@ class Part:
     about: dict[str, Any] = field(default_factory=dict)
     only: tuple[str, ...] = ()
     tell: Callable[[float], None] = _nobody
+    root: Root | None = None
 
     def blocks(self) -> Iterator[Motion]:
         """The motion, some instants at a time."""
         for at in range(0, len(self.motion), BLOCK):
             yield self.motion[at : at + BLOCK]
             self.tell(min(1.0, (at + BLOCK) / len(self.motion)))
+
+    def pose(self, motion: Motion) -> Pose:
+        """The placed hand at instants of the part; NaN where a room is known but not its place."""
+        pose = pose_of(self.setup, motion.q_world_sensor)
+        return pose if self.root is None else self.root.placing(pose, motion.time_us)
 
     def seconds(self, motion: Motion) -> Float[Array, " n"]:
         """Times of instants [s], to the microsecond."""

@@ -11,7 +11,7 @@ from handstudio.arrays import Array
 from handstudio.export.part import Part
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import FINGERS, JOINTS, SEGMENTS
-from handstudio.kinematics import angles_of, pose_of, relative_rotations, segment_attitudes
+from handstudio.kinematics import angles_of, relative_rotations, segment_attitudes
 from handstudio.pipeline import Motion
 from handstudio.setup import Setup
 
@@ -43,7 +43,7 @@ def table_of(part: Part) -> Table:
         case "segments":
             return _segments(part.setup)
         case "positions":
-            return _positions(part.setup)
+            return _positions(part)
         case _:
             return _orientations(part.setup)
 
@@ -64,11 +64,11 @@ def _angles(part: Part) -> Table:
     )
 
 
-def _positions(setup: Setup) -> Table:
+def _positions(part: Part) -> Table:
     """Millimetres."""
 
     def values(motion: Motion) -> Array:
-        return points_mm(pose_of(setup, motion.q_world_sensor)).reshape(len(motion), -1)
+        return points_mm(part.pose(motion)).reshape(len(motion), -1)
 
     return Table([f"{point}_{axis}_mm" for point in POINTS for axis in "xyz"], values, 3)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import BinaryIO
 
 import numpy as np
@@ -10,7 +11,6 @@ from handstudio.arrays import Array
 from handstudio.export.frames import blocks, frames_of
 from handstudio.export.part import Part
 from handstudio.export.tables import POINTS, points_mm
-from handstudio.kinematics import pose_of
 
 
 def write(part: Part, file: BinaryIO) -> None:
@@ -21,7 +21,7 @@ def write(part: Part, file: BinaryIO) -> None:
         time_s = np.round(np.arange(first, first + count) / frames.rate_hz, 6)
         time_s[rows] = part.seconds(motion)
         cells = np.full((count, 3 * len(POINTS)), "", dtype=object)
-        cells[rows] = _cells(points_mm(pose_of(part.setup, motion.q_world_sensor)))
+        cells[rows] = _cells(points_mm(part.pose(motion)))
         lines = [
             "\t".join([str(first + row + 1), f"{time_s[row]:.6f}", *cells[row]])
             for row in range(count)
@@ -46,6 +46,7 @@ def _header(rate_hz: float, first: int, count: int) -> str:
 
 def _cells(points: Array) -> Array:
     flat = points.reshape(len(points), -1)
-    return np.array([[f"{value:.4f}" for value in row] for row in flat], dtype=object).reshape(
-        flat.shape
-    )
+    return np.array(
+        [["" if math.isnan(value) else f"{value:.4f}" for value in row] for row in flat],
+        dtype=object,
+    ).reshape(flat.shape)

@@ -37,6 +37,16 @@ def posed(skeleton: Skeleton, q_world_segment: Float[Array, "*n k 4"]) -> Pose:
     return Pose(q_world_segment, t_world_joint, t_world_joint[..., distal, :] + tips)
 
 
+def moved(pose: Pose, q_room_world: Float[Array, "n 4"], t_room_elbow: Float[Array, "n 3"]) -> Pose:
+    """The same hand in a room whose place is known: everything of the result is in that frame."""
+    q_all = q_room_world[:, None]
+    return Pose(
+        so3.multiply(q_all, pose.q_world_segment),
+        so3.rotate(q_all, pose.t_world_joint) + t_room_elbow[:, None],
+        so3.rotate(q_all, pose.t_world_tip) + t_room_elbow[:, None],
+    )
+
+
 def bone_ends(pose: Pose) -> tuple[Float[Array, "*n b 3"], Float[Array, "*n b 3"]]:
     """Both ends of every drawn bone: parent joint to joint, then distal joints to tips."""
     inner = [child for child, parent in enumerate(PARENTS) if parent >= 0]

@@ -21,7 +21,7 @@ LONGEST = 80, 180
 
 _BESIDE = (
     *(".notes.json", ".notes.json.bak", ".notes.json.new"),
-    *(".motion", ".reference.npz", ".truth.npz"),
+    *(".motion", ".reference.npz", ".truth.npz", ".track.npz"),
 )
 
 # Windows takes these for devices, whatever comes after a dot

@@ -1,8 +1,8 @@
 """A take and its notes as one file, to be sent to somebody; and taking in what somebody sent.
 
-The parcel is a zip of ``take.mcap`` and, where there are any, ``notes.json``. What it holds is
-checked before it enters the library, where it lies under its own subject and day; nothing there is
-replaced.
+The parcel is a zip of ``take.mcap`` and, where there are any, ``notes.json`` and ``track.npz``.
+What it holds is checked before it enters the library, where it lies under its own subject and day;
+nothing there is replaced.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from handstudio.errors import TakeError
 from handstudio.recording.library import new_take_path
 from handstudio.recording.notes import load_notes, notes_path, save_notes
 from handstudio.recording.take import Take, open_take
+from handstudio.recording.take_track import track_path
 
 SUFFIX = ".take.zip"
-_TAKE, _NOTES = "take.mcap", "notes.json"
+_TAKE, _NOTES, _TRACK = "take.mcap", "notes.json", "track.npz"
 
 
 def pack(take: Take, target: Path) -> Path:
@@ -34,8 +35,9 @@ def pack(take: Take, target: Path) -> Path:
     try:
         with zipfile.ZipFile(fresh, "w", zipfile.ZIP_STORED) as parcel:  # it is compressed inside
             parcel.write(take.path, _TAKE)
-            if notes.exists():
-                parcel.write(notes, _NOTES)
+            for beside, name in ((notes, _NOTES), (track_path(take.path), _TRACK)):
+                if beside.exists():
+                    parcel.write(beside, name)
         fresh.replace(target)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -69,9 +71,9 @@ def take_in(file: Path, sessions: Path) -> Path:
                 _unpack(file, Path(place))
             else:
                 shutil.copyfile(file, path)
-                beside = notes_path(file)
-                if beside.exists():
-                    shutil.copyfile(beside, notes_path(path))
+                for place_of in (notes_path, track_path):
+                    if place_of(file).exists():
+                        shutil.copyfile(place_of(file), place_of(path))
             return _settle(path, _name_of(file), sessions)
         except (OSError, zipfile.BadZipFile) as error:
             raise TakeError(
@@ -92,7 +94,8 @@ def _unpack(file: Path, place: Path) -> None:
                 path=file,
                 suffix=SUFFIX,
             )
-        for name, path in ((_TAKE, place / _TAKE), (_NOTES, notes_path(place / _TAKE))):
+        take = place / _TAKE
+        for name, path in ((_TAKE, take), (_NOTES, notes_path(take)), (_TRACK, track_path(take))):
             if name in held:
                 with parcel.open(name) as source, path.open("wb") as copy:
                     shutil.copyfileobj(source, copy)
@@ -112,6 +115,8 @@ def _settle(path: Path, name: str, sessions: Path) -> Path:
         fresh.unlink(missing_ok=True)
     if notes_path(path).exists():
         save_notes(target, notes)
+    if track_path(path).exists():
+        shutil.copyfile(track_path(path), track_path(target))
     return target
 
 

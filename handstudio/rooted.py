@@ -1,0 +1,319 @@
+"""A hand's place and heading in a tracker's room, where a take has the track of a terminal.
+
+The track says where one sensor of the glove was; the inertial motion says the rest. Both are held
+together by `trackers.late_root`: its filter goes through the take instant by instant, so that
+cutting it anywhere changes no digit. What comes out is kept beside the take's motion.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from jaxtyping import Float, Int64, UInt8
+
+from handstudio import __version__
+from handstudio.arrays import Array
+from handstudio.calibration.device import corrected
+from handstudio.errors import CalibrationError, TrackError
+from handstudio.fusion.vqf_filter import VqfFilter
+from handstudio.hand.pose import Pose, moved
+from handstudio.hand.skeleton import SEGMENTS
+from handstudio.hand_fit import mechanism_of
+from handstudio.kinematics import pose_of
+from handstudio.maths import so3
+from handstudio.pipeline import Doubt, Motion
+from handstudio.recording.take import Take
+from handstudio.recording.take_track import KeptTrack, TrackFacts, load_track, track_hash
+from handstudio.setup import Setup
+from handstudio.trackers import late_root
+from handstudio.trackers.late_align import Alignment, align
+from handstudio.trackers.late_root import Felt, RootFilter
+from handstudio.trackers.track import Track
+
+WITHIN_S = 10.0
+"""How far a tracker's clock may begin from the take's first instant, unless told."""
+
+_BELIEVED_SD_M = 0.05  # a place that is known worse is none
+_FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
+_LEVER_SD_M = 0.03
+_AGAIN_S = (-0.1, 0.1)  # a kept track is aligned already; another setup may shift it a little
+_STEP = 2048
+_BAD = int(Doubt.UNPLACED | Doubt.SILENT)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Root:
+    """Where the elbow is in the room, and how the inertial world lies in it; NaN where unknown.
+
+    Attributes:
+        time_us: Of the motion's instants.
+        t_room_elbow: [m].
+        q_room_world: What takes the motion's attitudes into the room.
+        sd_m: How sure the place of the sensor is, along one axis.
+        fates: What was done with every pose (`trackers.late_faults.Fate`).
+        sensor: The sensor the terminal sits on.
+    """
+
+    time_us: Int64[Array, " n"]
+    t_room_elbow: Float[Array, "n 3"]
+    q_room_world: Float[Array, "n 4"]
+    sd_m: Float[Array, " n"]
+    fates: UInt8[Array, " m"]
+    sensor: str
+
+    def placing(self, pose: Pose, time_us: Int64[Array, " n"]) -> Pose:
+        """A pose of instants of the motion, moved into the room; NaN where that is not known."""
+        at = np.searchsorted(self.time_us, time_us)
+        return moved(pose, self.q_room_world[at], self.t_room_elbow[at])
+
+
+def aligned_track(
+    take: Take,
+    motion: Motion,
+    track: Track,
+    source: str,
+    *,
+    sensor: str | None = None,
+    lever_m: tuple[float, float, float] | None = None,
+    within_s: float = WITHIN_S,
+) -> KeptTrack:
+    """A track on a take's clock, with the sensor it sits on.
+
+    Args:
+        take: The recording.
+        motion: Its motion by its own setup.
+        track: Of one terminal, its times from about the take's first instant.
+        source: Name of the file it came from.
+        sensor: The one it sits on; None: the one whose attitude stays with it best.
+        lever_m: Where it sits in that sensor's axes; None: found from the motion, which takes some
+            fast movements.
+        within_s: How far the two clocks may be apart.
+
+    Raises:
+        CalibrationError: it turns as no sensor does, or as another than the one that was named; or
+            too little was seen of it.
+    """
+    setup = take.header.setup
+    track = replace(track, time_us=track.time_us + motion.time_us[0])
+    names = setup.layout.names
+    if sensor is not None and sensor not in names:
+        raise CalibrationError(
+            "There is no sensor {sensor}.",
+            "Choose one of: {known}.",
+            sensor=sensor,
+            known=", ".join(names),
+        )
+    found, best = _best(setup, motion, track, sensor, (-within_s, within_s))
+    offset_us = round(found.delay_s * 1e6)
+    track = replace(track, time_us=track.time_us - offset_us)
+    sd = 0.0
+    if lever_m is None:
+        filter = _filter(replace(found, delay_s=0.0), None)
+        felt = _felt(take, setup, motion, names.index(best))
+        _placed, state = late_root.run(filter, late_root.begin(filter), felt, track)
+        lever_m = tuple(state.lever.tolist())
+        sd = float(np.sqrt(np.trace(state.p[late_root.LEVER, late_root.LEVER]) / 3.0))
+    facts = TrackFacts(
+        terminal=track.name,
+        source=source,
+        sensor=best,
+        t_sensor_terminal=lever_m,
+        lever_source="measured" if sd == 0.0 else "found",
+        lever_sd_m=sd,
+        offset_s=found.delay_s,
+        correlation=found.correlation,
+        residual_rad=found.residual_rad,
+    )
+    return KeptTrack(track, facts)
+
+
+def root_of(take: Take, setup: Setup, motion: Motion) -> Root | None:
+    """Where the hand was in the room; None of a take without a track, or without a hand.
+
+    Computed once, then found beside the take's motion.
+
+    Args:
+        take: The recording.
+        setup: What the motion was computed by.
+        motion: All of it.
+
+    Raises:
+        TakeError: the take or its track cannot be read.
+        TrackError: the track is not of this glove's layout.
+        CalibrationError: by this setup the track cannot be aligned.
+    """
+    kept = load_track(take.path) if setup.layout.is_hand else None
+    if kept is None:
+        return None
+    path = _place(take, setup, motion)
+    root = _opened(path, kept, motion)
+    if root is None:
+        root = _computed(take, setup, motion, kept)
+        with suppress(OSError):  # it can be computed again
+            _keep(path, root)
+    return root
+
+
+def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root:
+    names = setup.layout.names
+    if kept.facts.sensor not in names:
+        raise TrackError(
+            "The track sits on {sensor}, which this glove has not.",
+            "Add the track again: handstudio add-track.",
+            sensor=kept.facts.sensor,
+        )
+    k = names.index(kept.facts.sensor)
+    found = align(*_attitudes(setup, motion, k), kept.track, _AGAIN_S)
+    filter = _filter(found, kept.facts.t_sensor_terminal)
+    felt = _felt(take, setup, motion, k)
+    placed, _ = late_root.run(filter, late_root.begin(filter), felt, kept.track)
+    believed = placed.sd_m <= _BELIEVED_SD_M
+    q_room_world = np.where(believed[:, None], placed.q_room_world, np.nan)
+    t_room_sensor = np.where(believed[:, None], placed.t_room_sensor, np.nan)
+    t_room_elbow = np.concatenate(
+        [
+            _elbow(setup, motion[at : at + _STEP], k, t_room_sensor[at:][:_STEP], q_at)
+            for at in range(0, len(motion), _STEP)
+            for q_at in [q_room_world[at : at + _STEP]]
+        ]
+        or [np.zeros((0, 3))]
+    )
+    return Root(
+        np.array(motion.time_us),
+        t_room_elbow,
+        q_room_world,
+        placed.sd_m,
+        placed.fates,
+        kept.facts.sensor,
+    )
+
+
+def _elbow(
+    setup: Setup, motion: Motion, k: int, t_room_sensor: Array, q_room_world: Array
+) -> Array:
+    """From a sensor to its segment's joint, and from there along the bones."""
+    q_room_sensor = so3.multiply(q_room_world, motion.q_world_sensor[:, k])
+    t_sensor_joint = mechanism_of(setup).t_sensor_joint[k]
+    t_room_joint = t_room_sensor + so3.rotate(q_room_sensor, t_sensor_joint)
+    segment = SEGMENTS.index(setup.layout.sensors[k].segment)
+    t_world_joint = pose_of(setup, motion.q_world_sensor).t_world_joint[:, segment]
+    return np.asarray(t_room_joint - so3.rotate(q_room_world, t_world_joint))
+
+
+def _attitudes(setup: Setup, motion: Motion, k: int) -> tuple[Array, Array]:
+    placed = (motion.doubt[:, k] & _BAD) == 0
+    return np.array(motion.time_us[placed]), _in_time(setup, motion.q_world_sensor[:, k])[placed]
+
+
+def _in_time(setup: Setup, q: Array) -> Array:
+    """Attitudes of the instants they are said to be of.
+
+    VQF adds the newest rate for the whole interval that it ends, so it is half an interval ahead
+    where rates are of an instant; at 10 rad/s and 100 Hz that is 3 degrees.
+    """
+    q = np.array(q)
+    if not isinstance(setup.filter, VqfFilter) or setup.mean_rates or len(q) < 2:
+        return q
+    before, now = q[:-1], q[1:]
+    near = np.sum(before * now, axis=-1, keepdims=True) < 0.0
+    q[1:] = so3.normalize(now + np.where(near, -before, before))
+    return q
+
+
+def _best(
+    setup: Setup,
+    motion: Motion,
+    track: Track,
+    wanted: str | None,
+    search_s: tuple[float, float],
+) -> tuple[Alignment, str]:
+    """The sensor whose attitude stays with the terminal's, and how the two are aligned.
+
+    The first that turns alike tells the clock; the others are held against it with that.
+    """
+    names, found = setup.layout.names, dict[str, Alignment]()
+    first = [] if wanted is None else [wanted]
+    refused: CalibrationError | None = None
+    for name in [*first, *(n for n in names if n not in first)]:
+        if wanted in found and found[wanted].residual_rad <= _FIXED_RAD:
+            break
+        try:
+            found[name] = align(*_attitudes(setup, motion, names.index(name)), track, search_s)
+            if len(found) == 1:
+                clock_s = found[name].delay_s
+                search_s = clock_s + _AGAIN_S[0], clock_s + _AGAIN_S[1]
+        except CalibrationError as error:
+            refused = refused or error
+    if not found:
+        assert refused is not None  # there is a sensor
+        raise refused
+    best = min(found, key=lambda name: found[name].residual_rad)
+    chosen = wanted or best
+    if chosen not in found or found[chosen].residual_rad > _FIXED_RAD:
+        raise CalibrationError(
+            "The terminal {terminal} does not stay with {sensor}; of all it stays best with "
+            "{best}, within {degrees:.1f} deg.",
+            "Name the sensor it sits on; were two terminals exchanged?",
+            terminal=track.name,
+            sensor=chosen,
+            best=best,
+            degrees=float(np.rad2deg(found[best].residual_rad)),
+        )
+    return found[chosen], chosen
+
+
+def _filter(found: Alignment, lever: tuple[float, float, float] | None) -> RootFilter:
+    sd = _LEVER_SD_M if lever is None else 0.0
+    like = RootFilter(t_sensor_terminal=lever or (0.0, 0.0, 0.0), lever_sd=sd, delay_sd=0.01)
+    return late_root.filter_for(found, like)
+
+
+def _felt(take: Take, setup: Setup, motion: Motion, k: int) -> Felt:
+    """What the sensor felt, instant by instant of the motion."""
+    acc = [np.zeros((0, 3))]
+    for run in take.runs():
+        sound = run if setup.sensors is None else corrected(run, setup.sensors, setup.layout.names)
+        acc.append(sound.acc[:, k])
+    known = (motion.doubt[:, k] & _BAD) == 0
+    time_us, q = np.array(motion.time_us), _in_time(setup, motion.q_world_sensor[:, k])
+    return Felt(time_us, q, np.concatenate(acc), known)
+
+
+def _place(take: Take, setup: Setup, motion: Motion) -> Path:
+    parts = f"{take.sha256()} {setup.key} {__version__} {track_hash(take.path)} {len(motion)}"
+    key = hashlib.sha256(parts.encode()).hexdigest()[:16]
+    return take.path.with_suffix(".motion") / f"root-{key}.npz"
+
+
+def _keep(path: Path, root: Root) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(path.name + ".new")
+    with fresh.open("wb") as file:
+        np.savez(
+            file,
+            t_room_elbow=root.t_room_elbow,
+            q_room_world=root.q_room_world,
+            sd_m=root.sd_m,
+            fates=root.fates,
+        )
+    fresh.replace(path)
+
+
+def _opened(path: Path, kept: KeptTrack, motion: Motion) -> Root | None:
+    try:
+        with path.open("rb") as stream, np.load(stream) as file:
+            return Root(
+                np.array(motion.time_us),
+                file["t_room_elbow"],
+                file["q_room_world"],
+                file["sd_m"],
+                file["fates"],
+                kept.facts.sensor,
+            )
+    except (OSError, KeyError, ValueError, EOFError, BadZipFile):
+        return None

@@ -1,0 +1,181 @@
+"""A take and the track of a tracker: the hand in the tracker's room."""
+
+from __future__ import annotations
+
+import csv
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from handstudio.cli import main
+from handstudio.errors import CalibrationError
+from handstudio.export.export import export
+from handstudio.export.formats import FORMATS
+from handstudio.export.part import Processed
+from handstudio.kinematics import pose_of
+from handstudio.maths import so3
+from handstudio.process import process
+from handstudio.recording.naming import belongings
+from handstudio.recording.parcel import pack, take_in
+from handstudio.recording.simulated import rehearse, simulate
+from handstudio.recording.take import open_take
+from handstudio.recording.take_track import load_track, save_track, track_path
+from handstudio.recording.truth import load_truth
+from handstudio.rooted import aligned_track, root_of
+from handstudio.simulation.imperfections.strengths import IDEAL
+from handstudio.trackers.late_align import attitude_at
+from handstudio.trackers.track import Track
+from handstudio.trim import trim
+
+ROOM = so3.about_z(1.1)
+ORIGIN = np.array([0.3, -0.2, 0.1])
+LEVER = (0.01, 0.0, 0.005)
+BEGINS_S = 1.25  # of the tracker's clock, on the take's
+SENSOR = "SN4"
+MOTION = "tissue"
+SECONDS = 14.0
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory) -> Path:
+    """The ideal subject pulls a tissue and wipes with it, nothing wrong with the sensors."""
+    sessions = tmp_path_factory.mktemp("sessions")
+    start = datetime(2026, 3, 4, 12, tzinfo=UTC)
+    return simulate(
+        sessions,
+        rehearse(0, MOTION, IDEAL),
+        seconds=SECONDS,
+        code="S01",
+        name="tissue",
+        start=start,
+    )
+
+
+@pytest.fixture(scope="module")
+def track(take) -> Track:
+    """A terminal beside the hand's sensor, by a tracker of 60 Hz whose clock began later."""
+    return _track(take, SENSOR)
+
+
+@pytest.fixture(scope="module")
+def motion(take):
+    return process(open_take(take))
+
+
+@pytest.fixture(scope="module")
+def kept(take, motion, track):
+    found = aligned_track(open_take(take), motion, track, "t.csv", sensor=SENSOR, lever_m=LEVER)
+    save_track(take, found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def root(take, motion, kept):
+    return root_of(open_take(take), open_take(take).header.setup, motion)
+
+
+def test_clock_and_attitude_are_found(kept):
+    assert kept.facts.offset_s == pytest.approx(-BEGINS_S, abs=0.005)
+    assert np.rad2deg(kept.facts.residual_rad) < 1.5
+
+
+def test_the_hand_stands_where_it_was_in_the_room(take, motion, root):
+    truth, setup = load_truth(take), open_take(take).header.setup
+    pose = root.placing(pose_of(setup, motion.q_world_sensor), motion.time_us)
+    wrist = pose.t_world_joint[:, 1]
+    true = ORIGIN + so3.rotate(ROOM, truth.t_world_joint[: len(motion), 1].astype(float))
+    off = np.linalg.norm(wrist - true, axis=-1)
+    known = np.isfinite(off) & (motion.time_us > 5_000_000)
+    assert known.sum() > 800
+    assert np.sqrt(np.mean(off[known] ** 2)) < 0.004
+    heading = so3.heading(so3.multiply(root.q_room_world[known], so3.conjugate(ROOM)))
+    assert np.rad2deg(np.abs(heading)).max() < 3.0
+
+
+def test_the_same_take_gives_the_same_digits_again(take, motion, root):
+    again = root_of(open_take(take), open_take(take).header.setup, motion)
+    np.testing.assert_array_equal(again.t_room_elbow, root.t_room_elbow)
+    for kept in take.with_suffix(".motion").glob("root-*.npz"):
+        kept.unlink()
+    anew = root_of(open_take(take), open_take(take).header.setup, motion)
+    np.testing.assert_array_equal(anew.t_room_elbow, root.t_room_elbow)
+
+
+def test_positions_are_exported_in_the_room(take, motion, root, tmp_path):
+    source = Processed(open_take(take), open_take(take).header.setup, motion)
+    export(source, tmp_path / "p.csv", FORMATS["csv"], content="positions")
+    rows = list(csv.DictReader((tmp_path / "p.csv").read_text().splitlines()))
+    at = len(rows) // 2
+    elbow = [float(rows[at][f"elbow_{axis}_mm"]) for axis in "xyz"]
+    np.testing.assert_allclose(elbow, 1e3 * root.t_room_elbow[at], atol=1e-3)
+    assert '"sensor": "SN4"' in (tmp_path / "p.csv.json").read_text()
+
+
+def test_a_take_without_a_track_is_as_it_was(take, motion, track, kept, tmp_path):
+    file = tmp_path / "bare.mcap"
+    file.write_bytes(take.read_bytes())
+    assert root_of(open_take(file), open_take(file).header.setup, motion) is None
+
+
+def test_a_track_goes_where_its_take_goes(take, kept, tmp_path):
+    assert track_path(take) in belongings(take)
+    parcel = pack(open_take(take), tmp_path / "tissue.take.zip")
+    arrived = take_in(parcel, tmp_path / "other")
+    assert load_track(arrived).facts == kept.facts
+
+
+def test_a_part_of_a_take_has_the_same_places(take, root):
+    part = trim(open_take(take), 6.0, 12.0, name="part")
+    opened = open_take(part)
+    again = root_of(opened, opened.header.setup, process(opened))
+    first = np.searchsorted(root.time_us, again.time_us[0])
+    off = again.t_room_elbow - root.t_room_elbow[first : first + len(again.time_us)]
+    # it is aligned by less motion, and the elbow is a forearm away from the terminal
+    assert np.nanmax(np.linalg.norm(off[200:], axis=-1)) < 0.012
+
+
+def test_the_sensor_is_found_where_none_is_named(take, motion, track):
+    found = aligned_track(open_take(take), motion, track, "t.csv", lever_m=LEVER)
+    on = {p.sensor: p.segment for p in open_take(take).header.setup.layout.sensors}
+    assert on[found.facts.sensor] in ("hand", "hand_ulnar")
+
+
+def test_a_terminal_of_another_segment_is_refused_and_its_own_is_named(take, motion, track):
+    with pytest.raises(CalibrationError, match="does not stay with SN1"):
+        aligned_track(open_take(take), motion, track, "t.csv", sensor="SN1", lever_m=LEVER)
+
+
+def test_the_command_reads_a_file(take, track, tmp_path, capsys):
+    file = tmp_path / "tracker.csv"
+    with file.open("w", newline="") as stream:
+        rows = csv.writer(stream)
+        names = [f"hand_{axis}_m" for axis in "xyz"] + [f"hand_q{part}" for part in "wxyz"]
+        rows.writerow(["time_s", *names])
+        for us, t, q in zip(
+            track.time_us, track.t_room_terminal, track.q_room_terminal, strict=True
+        ):
+            rows.writerow([us * 1e-6, *t, *q])
+    copy = tmp_path / "again.mcap"
+    copy.write_bytes(take.read_bytes())
+    with pytest.raises(SystemExit) as ended:
+        main(["add-track", str(copy), str(file), "--sensor", SENSOR, "--lever-mm", "10", "0", "5"])
+    assert ended.value.code == 0
+    assert "hand sits on SN4" in capsys.readouterr().out
+    assert load_track(copy).facts.lever_source == "measured"
+
+
+def _track(take: Path, sensor: str) -> Track:
+    truth, rng = load_truth(take), np.random.default_rng(2)
+    k, time_s = truth.sensors.index(sensor), truth.time_us * 1e-6
+    time_s = time_s - time_s[0]
+    at = np.arange(BEGINS_S, time_s[-1] - 0.1, 1.0 / 60.0)
+    q = attitude_at(time_s, truth.q_world_sensor[:, k].astype(float), at)
+    t = CubicSpline(time_s, truth.t_world_sensor[:, k].astype(float))(at)
+    t = ORIGIN + so3.rotate(ROOM, t + so3.rotate(q, np.array(LEVER)))
+    q = so3.multiply(so3.multiply(ROOM, q), so3.exp(rng.normal(0.0, 0.0026, (len(at), 3))))
+    time_us = np.round((at - BEGINS_S) * 1e6).astype(np.int64)
+    t = t + rng.normal(0.0, 0.001, t.shape)
+    return Track("hand", time_us, t, q, np.ones(len(at)))
