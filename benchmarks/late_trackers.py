@@ -64,7 +64,7 @@ def main(
         development: Seeds and people that parameters may be chosen on, not those reported.
     """
     found = figures(seeds=seeds, people=people, development=development)
-    _show(found)
+    show(found)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(found, indent=2), encoding="utf-8")
@@ -75,15 +75,14 @@ def figures(*, seeds: int = 12, people: int = 4, development: bool = False) -> d
     numbers = (DEVELOPMENT if development else REPORTING)[:seeds]
     heads = [head(number) for number in numbers]
     hands = [hand(number, number) for number in numbers]
-    found: dict[str, Any] = {}
-    for name, follow in METHODS.items():
-        found[f"late.rms_1e2rad.{name}"] = {
-            "head": _rms(follow, heads),
-            "hand": _rms(follow, hands),
-        }
-    found["late.time_of_method1"] = _times(heads[0])
-    found |= _placed((DEVELOPMENT if development else REPORTING)[:people], development)
-    return found
+    rms = {
+        name: {"head": _rms(follow, heads), "hand": _rms(follow, hands)}
+        for name, follow in METHODS.items()
+    }
+    return {
+        "late": {"rms_1e2rad": rms, "time_of_method1": _times(heads[0])},
+        "root": _placed((DEVELOPMENT if development else REPORTING)[:people], development),
+    }
 
 
 def _ours(it: Watched) -> Array:
@@ -149,18 +148,19 @@ def _placed(people: range, development: bool) -> dict[str, Any]:
     for case in PLACED:
         mine = [one for name, one in told if name == case]
         keys = [key for key in mine[0] if key.endswith(("_mm", "_deg", "_ms"))]
-        found[f"root.{case}"] = {
+        found[case] = {
             key: float(np.sqrt(np.mean(np.square([one[key] for one in mine])))) for key in keys
         }
-        found[f"root.{case}"]["fastest_m_s"] = max(one["fastest_m_s"] for one in mine)
-    found["root.rms_mm"] = found["root.hand"]["root_mm"]
+        found[case]["fastest_m_s"] = max(one["fastest_m_s"] for one in mine)
+    found["rms_mm"] = found["hand"]["root_mm"]
     return found
 
 
-def _show(found: dict[str, Any]) -> None:
+def show(found: dict[str, Any]) -> None:
+    """Print what `figures` found."""
     rows = []
     for name in METHODS:
-        ours = found[f"late.rms_1e2rad.{name}"]
+        ours = found["late"]["rms_1e2rad"][name]
         rows.append(
             [
                 name,
@@ -173,14 +173,14 @@ def _show(found: dict[str, Any]) -> None:
         ["method", "paper", "head", "hand"],
         rows,
     )
-    times = found["late.time_of_method1"]
+    times = found["late"]["time_of_method1"]
     paper = PAPER_MS["method2"] / PAPER_MS["method1"]
     out.print(
         f"Time: method II {times['method2']:.2f} of method I (paper {paper:.2f}), "
         f"ours {times['ours']:.2f}."
     )
     for case in PLACED:
-        told = found[f"root.{case}"]
+        told = found["root"][case]
         words = ", ".join(f"{key} {value:.2f}" for key, value in told.items())
         out.print(f"Tracker on {case}: {words}")
 

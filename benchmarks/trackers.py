@@ -8,8 +8,6 @@ A terminal on each phalanx beside the index finger's DIP, a transmitter on the p
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import json
 from collections import defaultdict
 from collections.abc import Iterable
@@ -19,6 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
+from benchmarks import late_trackers
 from benchmarks.bent_joints import bent_joint, figures_of, skin_of_strength, summed
 from benchmarks.coil_range import coil_range, show_range
 from handstudio.errors import TrackError
@@ -60,9 +59,10 @@ def main(
     found: dict[str, Any] = {"people": list(numbers), "joint": joints(numbers)}
     found["coil"] = coil_range()
     show_range(found["coil"])
-    name = "benchmarks.late_trackers"
-    if late and importlib.util.find_spec(name) is not None:
-        found["late"] = importlib.import_module(name).figures()
+    if late:
+        lately = late_trackers.figures()
+        late_trackers.show(lately)
+        found |= lately
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(found, indent=2), encoding="utf-8")
