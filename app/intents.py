@@ -264,6 +264,11 @@ class RestoreTake:
 
 
 @dataclass(frozen=True, slots=True)
+class ComputeRest:
+    """Of the open take only the first seconds are there: compute the rest after all."""
+
+
+@dataclass(frozen=True, slots=True)
 class CancelWork:
     """The long work that is on is no longer wanted."""
 
@@ -503,6 +508,7 @@ Intent: TypeAlias = (
     | BinTake
     | Undo
     | RestoreTake
+    | ComputeRest
     | CancelWork
     | EmptyBin
     | DeleteSubject

@@ -55,7 +55,7 @@ class Reviewer:
         """The first seconds, where they are still waited for."""
         if take.path != self.opening or len(motion) == 0 or kept_motion(take) is not None:
             return None
-        return replace(reviewing.opened(take, motion), partial=True)
+        return replace(reviewing.opened(take, motion), rest="coming")
 
     def computed(self, take: Take, review: Review | None) -> Review | None:
         """All of a take that was computed, in the place of what was shown of it; None: not wanted.
@@ -73,6 +73,21 @@ class Reviewer:
         if review.partial:
             return reviewing.computed_by(review, take.header.setup, motion)
         return review
+
+    def uncomputed(self, take: Take, review: Review | None) -> Review | None:
+        """What is shown of a take whose computing was stopped or failed; None: nothing changes."""
+        if take.path == self.opening:
+            self.opening = None
+        if review is None or review.take.path != take.path or not review.partial:
+            return None
+        return replace(review, rest="missing")
+
+    def completed(self, review: Review) -> Review:
+        """With the rest of its take ordered, where that is missing."""
+        if review.rest != "missing":
+            return review
+        self.workshop.compute(review.take)
+        return replace(review, rest="coming")
 
     def brought(self, review: Review) -> Review:
         """With the motions that are asked for, as far as they are there; others are ordered.

@@ -42,6 +42,7 @@ from app.workshop import (
     Surveyed,
     Trimmed,
     Uncomputed,
+    Unseen,
     Workshop,
     Written,
 )
@@ -208,6 +209,10 @@ class Studio:
                 self._ask_of_review(smooth=on)
             case intents.Compare(name=name):
                 self._ask_of_review(compare=name)
+            case intents.ComputeRest():
+                if self.state.review is not None:
+                    rest = self._reviewer.completed(self.state.review)
+                    self.state = replace(self.state, review=rest)
             case intents.CancelWork():
                 self._workshop.cancel()
             case intents.SendDiagnostics(page=page):
@@ -662,7 +667,7 @@ class Studio:
         except HandstudioError as error:
             self._say(error)
 
-    def _finish_work(self) -> None:  # noqa: PLR0912 - a list
+    def _finish_work(self) -> None:  # noqa: PLR0912, PLR0915 - a list
         for outcome in self._workshop.done():
             match outcome:
                 case Computed(take=take, setup=None):
@@ -684,11 +689,18 @@ class Studio:
                 case Trimmed(path=path):
                     self._tell(_("Trimmed: {name} is a take of its own.").format(name=path.stem))
                     self.refresh_takes()
+                case Uncomputed(take=take, error=error, own=True):
+                    self._tell_why(error)
+                    shown = self._reviewer.uncomputed(take, self.state.review)
+                    self.state = replace(self.state, review=shown or self.state.review)
                 case Uncomputed(take=take, error=error):
                     self._tell_why(error)
                     here = self._is_open(take) or self._is_beside(take)
                     if here and self.state.review is not None:
                         self._bring(reviewing.settled(self.state.review))
+                case Unseen(take=take, what=what, error=error):
+                    self._tell_why(error)
+                    self._forget_order(take, what)
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
@@ -708,7 +720,21 @@ class Studio:
                     self._tell_why(outcome)
                 case _:
                     pass  # of a take that is no longer open
+            self._complete()
         self.state = replace(self.state, work=self._workshop.work)
+
+    def _forget_order(self, take: Take, what: str) -> None:
+        review = self.state.review
+        if review is not None and self._is_open(take):
+            self.state = replace(
+                self.state, review=replace(review, ordered=review.ordered - {what})
+            )
+
+    def _complete(self) -> None:
+        """An export, too, may have computed what was missing of the open take."""
+        review = self.state.review
+        if review is not None and review.rest == "missing":
+            self._show_computed(review.take)
 
     def _use(self, answer: Answer | HandstudioError) -> None:
         """What a course was for, from now on."""

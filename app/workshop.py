@@ -39,9 +39,19 @@ class Computed:
 
 @dataclass(frozen=True, slots=True)
 class Uncomputed:
-    """The motion of this take by another setup will not be there, and why not."""
+    """The motion of this take, by its own setup or another, will not be there, and why not."""
 
     take: Take
+    error: HandstudioError
+    own: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """Something about this take (as `Review.ordered` names it) will not be known, and why not."""
+
+    take: Take
+    what: str
     error: HandstudioError
 
 
@@ -121,7 +131,7 @@ class FoundIn:
     found: Found
 
 
-Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written | MeasuredPart) | (
+Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
     FoundIn | Trimmed | Added | Exported | Gathered | Solved
 )
 
@@ -153,7 +163,11 @@ class Workshop:
         """The motion of a take."""
         words = _("Computing the motion of {name}").format(name=take.path.stem)
         future = self.jobs.process(take.path)
-        self._pending.append(_Pending(future, lambda _result: Computed(take), words))
+
+        def fail(error: HandstudioError) -> Outcome:
+            return Uncomputed(take, error, own=True)
+
+        self._pending.append(_Pending(future, lambda _result: Computed(take), words, fail))
 
     def compute_by(self, take: Take, setup: Setup) -> None:
         """The motion of a take by another setup."""
@@ -174,7 +188,8 @@ class Workshop:
 
         words = _("Looking for writing and grasps in {name}").format(name=take.path.stem)
         future = self.jobs.find(take.path, setup)
-        self._pending.append(_Pending(future, use, words))
+        fail = _unseen(take, "found")
+        self._pending.append(_Pending(future, use, words, fail))
 
     def preview(self, take: Take) -> None:
         """The first seconds of a take, beside the computing of all of it."""
@@ -190,13 +205,15 @@ class Workshop:
         def use(found: tuple[Stretch, ...]) -> Outcome:
             return Surveyed(take, setup, found)
 
-        self._pending.append(_Pending(self.jobs.survey(take.path, setup), use, words))
+        future, fail = self.jobs.survey(take.path, setup), _unseen(take, "stretches")
+        self._pending.append(_Pending(future, use, words, fail))
 
     def write_signals(self, take: Take) -> None:
         """What the sensors of a take told."""
         words = _("Reading the signals of {name}").format(name=take.path.stem)
         future = self.jobs.signals(take.path)
-        self._pending.append(_Pending(future, lambda _result: Written(take), words))
+        fail = _unseen(take, "signals")
+        self._pending.append(_Pending(future, lambda _result: Written(take), words, fail))
 
     def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> None:
         """A part of a take as a take of its own."""
@@ -295,6 +312,10 @@ class Workshop:
                     reason=repr(error),
                 )
                 yield one.fail(failed)
+
+
+def _unseen(take: Take, what: str) -> Callable[[HandstudioError], Outcome]:
+    return lambda error: Unseen(take, what, error)
 
 
 def _taken_in(name: str, content: bytes | None, sessions: Path) -> Path:

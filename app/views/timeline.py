@@ -45,6 +45,13 @@ def words_of(stretch: Stretch) -> str:
     return f"{told} · {stretch.start_s:.2f}-{stretch.end_s:.2f} s"
 
 
+def rest_words(review: Review) -> str:
+    """What is missing of a take that is not all there."""
+    if review.rest == "coming":
+        return _("the first seconds; the rest is being computed")
+    return _("only the first seconds; the rest is not computed") if review.partial else ""
+
+
 def _parts(review: Review) -> Iterator[str]:
     end = max(review.duration_s, 1e-6)
 
@@ -84,14 +91,16 @@ def _legend(review: Review) -> str:
     """The kinds that occur; else that there are none."""
     style = "font-size:.72rem;line-height:1.3;opacity:.8"
     if review.stretches is None:
-        return f'<div style="{style}">{html.escape(_("looking through the take ..."))}</div>'
+        looked = "stretches" in review.ordered
+        words = _("looking through the take ...") if looked else _("not looked through")
+        return f'<div style="{style}">{html.escape(rest_words(review) or words)}</div>'
     found: dict[StretchKind, int] = {}
     for stretch in review.stretches:
         found[stretch.kind] = found.get(stretch.kind, 0) + 1
-    words = _kinds()
+    kinds = _kinds()
     told = " ".join(
         f'<span style="white-space:nowrap"><span style="color:{_COLOURS[kind]}">&#9632;</span> '
-        f"{html.escape(words[kind])} {count}</span>"
+        f"{html.escape(kinds[kind])} {count}</span>"
         for kind, count in sorted(found.items(), key=lambda one: list(_COLOURS).index(one[0]))
     )
     return f'<div style="{style}">{told or html.escape(_("nothing to look at twice"))}</div>'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,15 +15,19 @@ from app import intents
 from app import review as reviewing
 from app.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
 from app.comparison import OF_TAKE
+from app.jobs import Stopped
 from app.review import Review
+from app.review import opened as opened_review
 from app.state import State
 from app.studio import Studio
 from app.views import timeline
 from app.views.page import caption_of, curves_of
 from handstudio.analysis.stretches import Stretch
-from handstudio.process import kept_motion, process
+from handstudio.errors import HandstudioError
+from handstudio.process import kept_motion, process, process_head
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
+from handstudio.setup import Setup
 
 from .conftest import TICK_S, StillCapture, after
 
@@ -205,6 +210,57 @@ def test_the_first_seconds_are_there_before_the_rest(
     assert (review.at_s, len(review.motion)) == (1.5, len(motion))
 
 
+def test_a_rest_that_was_cancelled_is_no_longer_promised_and_can_be_had(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take, jobs = open_take(path), studio._workshop.jobs
+    running: list[Future[None]] = []
+
+    def wait(_path: Path, _setup: Setup | None = None) -> Future[None]:
+        running.append(Future())
+        return running[-1]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(jobs, "process", wait)
+        state = until(studio, intents.OpenTake(path), lambda state: state.review is not None)
+        assert "is being computed" in caption_of(state)
+        running[0].set_exception(Stopped("It was stopped.", "Nothing was changed."))
+        state = until(studio, intents.Seek(0.5), lambda state: state.work is None)
+        assert state.review is not None
+        assert state.review.rest == "missing"
+        assert "is not computed" in caption_of(state)
+        assert "is not computed" in timeline.as_svg(state.review)
+        assert "is being computed" in caption_of(after(studio, intents.ComputeRest()))
+        running[1].set_exception(HandstudioError("The job was killed.", "Try again."))
+        state = studio.tick(TICK_S)
+        assert state.messages[0].alarm
+        assert "is not computed" in caption_of(state)
+    state = until(studio, intents.ComputeRest(), lambda state: state.work is None)
+    assert state.review is not None
+    assert state.review.rest == "here"
+    assert (state.review.at_s, len(state.review.motion)) == (0.5, len(process(take)))
+
+
+def test_an_export_brings_the_rest_as_well(studio: Studio, path: Path) -> None:
+    take = open_take(path)
+    part = opened_review(take, process_head(take, 2.0))
+    studio.state = replace(studio.state, review=replace(part, rest="missing"))
+    state = until(
+        studio, intents.Export(None, 1, "csv"), lambda state: state.review and not state.work
+    )
+    assert state.review is not None
+    assert state.review.rest == "here"
+
+
+def test_what_was_stopped_is_not_said_to_be_looked_through(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopped: Future[None] = Future()
+    stopped.set_exception(Stopped("It was stopped.", "Nothing was changed."))
+    monkeypatch.setattr(studio._workshop.jobs, "survey", lambda *_asked: stopped)
+    assert "not looked through" in timeline.as_svg(opened(studio, path))
+
+
 def test_the_strip_tells_what_to_look_at_twice(studio: Studio, path: Path) -> None:
     review = opened(studio, path)
     assert review.stretches is not None
@@ -216,7 +272,8 @@ def test_the_strip_tells_what_to_look_at_twice(studio: Studio, path: Path) -> No
     assert "gap 20 instants missing · 1.00-1.20 s" in strip
     assert "hardly possible index_dip_flexion 31° beyond" in strip
     assert "nothing to look at twice" in timeline.as_svg(replace(review, stretches=()))
-    assert "looking through" in timeline.as_svg(replace(review, stretches=None))
+    on = replace(review, stretches=None, ordered=frozenset(["stretches"]))
+    assert "looking through" in timeline.as_svg(on)
 
 
 def test_a_take_is_looked_through_once(
