@@ -24,6 +24,7 @@ class TransportPanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab(_("Replay"), viser.Icon.TIMELINE):
+            self._playhead = gui.add_html("")
             self._strip = gui.add_html("")
             self._written_page = gui.add_html("", visible=False)
             self._time = gui.add_slider(_("Time [s]"), 0.0, 1.0, _STEP_S, 0.0)
@@ -55,6 +56,7 @@ class TransportPanel:
                 _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
         self._panel.float(x=16.0, y=-16.0, width=440.0, height=404.0)
+        self._drawn: object = None
         self._playing = False
         self._written = 0.0
         self._time.on_update(typed(lambda at_s: send(intents.Seek(at_s))))
@@ -89,7 +91,11 @@ class TransportPanel:
         if review is None:
             return
         self._render_time(review)
-        put(self._strip, content=timeline.as_svg(review))
+        put(self._playhead, content=timeline.playhead(review))
+        drawn = timeline.drawn_from(review)
+        if drawn != self._drawn:  # as long as the take: not made anew for every instant
+            self._drawn = drawn
+            put(self._strip, content=timeline.as_html(review))
         picture = trace_picture(review)
         put(self._written_page, content=picture, visible=bool(picture))
         put(self._clock, content=_here(review))

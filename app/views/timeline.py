@@ -6,13 +6,15 @@ import html
 from collections.abc import Iterator
 
 from app.review import Review
+from app.views import lane
 from app.views.written import grasp_words
-from app.words import _
+from app.words import _, language
 from handstudio.analysis.stretches import Stretch, StretchKind
 
 _WIDTH = 1000.0  # of the drawing; the page stretches it
 
 # lanes from above: notes, the take itself, what is missing or doubted, what can hardly be, grasps
+# and pen strokes
 _NOTED, _TAKE, _DATA, _HARDLY = (4, 7), (14, 8), (25, 5), (32, 5)
 _GRASPS = (39, 5)
 _HEIGHT = 47
@@ -27,13 +29,36 @@ _COLOURS: dict[StretchKind, str] = {
 }
 
 
-def as_svg(review: Review) -> str:
-    """The strip with the playhead, and which colour is what, as the page shows it."""
+def as_html(review: Review) -> str:
+    """The strip, the names of what was found, which colour is what; all but the playhead."""
     parts = "".join(_parts(review))
     return (
         f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT}" '
-        f'height="{_HEIGHT}" width="100%" preserveAspectRatio="none">{parts}</svg>'
-        f"{_legend(review)}</div>"
+        f'height="{_HEIGHT}" width="100%" preserveAspectRatio="none" '
+        f'style="display:block">{parts}</svg>{lane.as_html(review)}{_legend(review)}</div>'
+    )
+
+
+def drawn_from(review: Review) -> tuple[object, ...]:
+    """What `as_html` depends on: the same as before, the same strip."""
+    window = review.from_s, review.to_s, review.in_s, review.out_s
+    found = review.stretches, review.found, review.ordered, review.rest
+    return review.take.path, id(review.motion), window, review.notes, *found, language()
+
+
+def playhead(review: Review) -> str:
+    """Where in the strip we are, to be put just before it on the page: it lies over it."""
+    marks = [_line(review.at_s / max(review.duration_s, 1e-6), 0, _HEIGHT)]
+    width = review.to_s - review.from_s
+    if 0.0 < width < review.duration_s - 1e-6:  # else one line goes through both
+        marks.append(_line((review.at_s - review.from_s) / width, _HEIGHT + 2, 15))
+    else:
+        marks.append(_line(review.at_s / max(review.duration_s, 1e-6), _HEIGHT, 17))
+    found = review.found is not None and (review.found.grasps or review.found.writings)
+    shown = marks if found else marks[:1]
+    return (
+        '<div style="position:relative;height:0;z-index:1;pointer-events:none"><div '
+        f'style="position:absolute;top:.1em;left:.75em;right:.75em">{"".join(shown)}</div></div>'
     )
 
 
@@ -69,9 +94,9 @@ def _parts(review: Review) -> Iterator[str]:
     if review.in_s > 0.0 or review.out_s is not None:
         yield _bar((at(review.in_s), at(review.end_s)), _TAKE, "#3b82f6", 0.6)
     for stretch in review.stretches or ():
-        lane = _HARDLY if stretch.kind in ("impossible", "drift") else _DATA
+        row = _HARDLY if stretch.kind in ("impossible", "drift") else _DATA
         span = wide(stretch.start_s, stretch.end_s)
-        yield _bar(span, lane, _COLOURS[stretch.kind], 0.9, words_of(stretch))
+        yield _bar(span, row, _COLOURS[stretch.kind], 0.9, words_of(stretch))
     for label in review.notes.labels:
         title = f"{label.label} {label.start_s:.2f}-{label.end_s:.2f} s"
         yield _bar(wide(label.start_s, label.end_s), _NOTED, "#12b886", 0.8, title)
@@ -82,9 +107,14 @@ def _parts(review: Review) -> Iterator[str]:
     for grasp in review.found.grasps if review.found else ():
         segment = grasp.segment
         title = f"{grasp_words(grasp)} {segment.hold_s:.2f}-{segment.release_s:.2f} s"
-        yield _bar((at(segment.start_s), at(segment.end_s)), _GRASPS, "#12b5cb", 0.35, title)
-        yield _bar((at(segment.hold_s), at(segment.release_s)), _GRASPS, "#12b5cb", 0.9, title)
-    yield _bar(_around(at(review.at_s), 1.0), (0, _HEIGHT), "currentColor", 1.0)
+        yield _bar((at(segment.start_s), at(segment.end_s)), _GRASPS, lane.GRASP, 0.35, title)
+        yield _bar((at(segment.hold_s), at(segment.release_s)), _GRASPS, lane.GRASP, 0.9, title)
+    for writing in review.found.writings if review.found else ():
+        begin_s, end_s = float(writing.time_s[0]), float(writing.time_s[-1])
+        title = f"{_('writing')} {begin_s:.2f}-{end_s:.2f} s"
+        yield _bar((at(begin_s), at(end_s)), _GRASPS, lane.INK, 0.35, title)
+        for down_s, up_s in lane.strokes_s(writing):
+            yield _bar((at(down_s), at(up_s)), _GRASPS, lane.INK, 0.9, title)
 
 
 def _legend(review: Review) -> str:
@@ -126,6 +156,15 @@ def _figures() -> dict[StretchKind, str]:
         "impossible": _("{worst:.0f}° beyond"),
         "drift": _("{worst:.0f}° a minute"),
     }
+
+
+def _line(share: float, top: int, height: int) -> str:
+    if not 0.0 <= share <= 1.0:
+        return ""
+    return (
+        f'<div style="position:absolute;left:calc({100 * share:.2f}% - 1px);top:{top}px;'
+        f'width:2px;height:{height}px;background:currentColor"></div>'
+    )
 
 
 def _around(middle: float, half: float) -> tuple[float, float]:
