@@ -46,14 +46,14 @@ class Reviewer:
             self.opening = None
             return reviewing.opened(take, motion)
         self.opening = take.path
-        self.workshop.compute(take)
-        if preview:
+        if preview:  # first: somebody waits for it
             self.workshop.preview(take)
+        self.workshop.compute(take)
         return None
 
     def head(self, take: Take, motion: Motion) -> Review | None:
         """The first seconds, where they are still waited for."""
-        if take.path != self.opening or len(motion) == 0 or kept_motion(take) is not None:
+        if take.path != self.opening or len(motion) == 0:
             return None
         return replace(reviewing.opened(take, motion), rest="coming")
 
@@ -102,7 +102,8 @@ class Reviewer:
             if motion is not None:
                 review = reviewing.computed_by(review, wanted, motion)
         if not review.compare:
-            review = replace(review, comparison=None)
+            if review.comparison is not None:
+                review = reviewing.seen_anew(replace(review, comparison=None))
         elif review.comparison is None or review.comparison.name != review.compare:
             review = self._beside(review)
         return self._looked_through(review)
@@ -125,10 +126,12 @@ class Reviewer:
         layout = review.setup.layout
         chosen = self.curves if self.curves in sets_of(layout) else OVERVIEW
         sensor = layout.names.index(self.sensor) if self.sensor in layout.names else 0
+        before = review
         review = replace(review, choice=Choice(chosen, sensor))
         if not review.partial:  # else all of it is on its way, and these afterwards
             review = self._ordered(review)
-        return reviewing.seen_anew(review)
+        same = review.choice == before.choice and review.signals is before.signals
+        return review if same else reviewing.seen_anew(review)
 
     def _ordered(self, review: Review) -> Review:
         """With what is kept of signals, stretches and finds; what is not is ordered, once."""

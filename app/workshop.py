@@ -195,7 +195,7 @@ class Workshop:
         """The first seconds of a take, beside the computing of all of it."""
         future = self._aside.submit(process_head, take)
         words = _("Computing the motion of {name}").format(name=take.path.stem)
-        # behind what is waited for: its share is that of the whole
+        # in the same words as the whole, whose share it tells
         self._pending.append(_Pending(future, lambda motion: Previewed(take, motion), words))
 
     def look_through(self, take: Take, setup: Setup | None) -> None:

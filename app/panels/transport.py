@@ -24,8 +24,9 @@ class TransportPanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab(_("Replay"), viser.Icon.TIMELINE):
-            self._playhead = gui.add_html("")
+            self._overlay = gui.add_html("")
             self._strip = gui.add_html("")
+            self._below = gui.add_html("")
             self._written_page = gui.add_html("", visible=False)
             self._time = gui.add_slider(_("Time [s]"), 0.0, 1.0, _STEP_S, 0.0)
             self._clock = gui.add_markdown("")
@@ -91,11 +92,12 @@ class TransportPanel:
         if review is None:
             return
         self._render_time(review)
-        put(self._playhead, content=timeline.playhead(review))
+        put(self._overlay, content=timeline.overlay(review))
         drawn = timeline.drawn_from(review)
-        if drawn != self._drawn:  # as long as the take: not made anew for every instant
+        if drawn != self._drawn:
             self._drawn = drawn
-            put(self._strip, content=timeline.as_html(review))
+            put(self._strip, content=timeline.strip(review))
+        put(self._below, content=timeline.below(review))
         picture = trace_picture(review)
         put(self._written_page, content=picture, visible=bool(picture))
         put(self._clock, content=_here(review))

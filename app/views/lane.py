@@ -68,10 +68,10 @@ def as_html(review: Review) -> str:
         return min(max((seconds - review.from_s) / width, 0.0), 1.0)
 
     seen = [one for one in found if one.end_s >= review.from_s and one.begin_s <= review.to_s]
-    ends = [share(after.begin_s) for after in seen[1:]] + [1.0]
+    begins = [*(share(one.begin_s) for one in seen), 1.0]
     parts = "".join(
-        _piece(one, share(one.begin_s), share(one.end_s), end)
-        for one, end in zip(seen, ends, strict=True)
+        _piece(one, begin, share(one.end_s), room)
+        for one, begin, room in zip(seen, begins[:-1], begins[1:], strict=True)
     )
     return f'<div style="position:relative;margin-top:.15em;{_LINE}">{parts}</div>'
 

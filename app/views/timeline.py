@@ -19,6 +19,8 @@ _NOTED, _TAKE, _DATA, _HARDLY = (4, 7), (14, 8), (25, 5), (32, 5)
 _GRASPS = (39, 5)
 _HEIGHT = 47
 
+_LENS, _PART = "rgba(128,128,128,.22)", "rgba(59,130,246,.6)"
+
 _COLOURS: dict[StretchKind, str] = {
     "gap": "#e5484d",
     "silent": "#e5484d",
@@ -30,35 +32,51 @@ _COLOURS: dict[StretchKind, str] = {
 
 
 def as_html(review: Review) -> str:
-    """The strip, the names of what was found, which colour is what; all but the playhead."""
+    """The strip, the names of what was found, which colour is what; all but what lies over it."""
+    return strip(review) + below(review)
+
+
+def strip(review: Review) -> str:
+    """The whole take; as long as that is, so it is made only where `drawn_from` differs."""
     parts = "".join(_parts(review))
     return (
-        f'<div style="padding:.1em .75em"><svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT}" '
+        f'<div style="padding:.1em .75em 0"><svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT}" '
         f'height="{_HEIGHT}" width="100%" preserveAspectRatio="none" '
-        f'style="display:block">{parts}</svg>{lane.as_html(review)}{_legend(review)}</div>'
+        f'style="display:block">{parts}</svg></div>'
     )
 
 
 def drawn_from(review: Review) -> tuple[object, ...]:
-    """What `as_html` depends on: the same as before, the same strip."""
-    window = review.from_s, review.to_s, review.in_s, review.out_s
-    found = review.stretches, review.found, review.ordered, review.rest
-    return review.take.path, id(review.motion), window, review.notes, *found, language()
+    """What `strip` depends on: the same as before, the same strip."""
+    noted = review.notes, review.stretches, review.found
+    return review.take.path, id(review.motion), *noted, language()
 
 
-def playhead(review: Review) -> str:
-    """Where in the strip we are, to be put just before it on the page: it lies over it."""
-    marks = [_line(review.at_s / max(review.duration_s, 1e-6), 0, _HEIGHT)]
+def below(review: Review) -> str:
+    """The names of what is in the plots, and which colour is what."""
+    return f'<div style="padding:0 .75em .1em">{lane.as_html(review)}{_legend(review)}</div>'
+
+
+def overlay(review: Review) -> str:
+    """The playhead, the part that counts and what is in the plots.
+
+    It belongs just before the strip on the page: it lies over it.
+    """
+    end = max(review.duration_s, 1e-6)
     width = review.to_s - review.from_s
-    if 0.0 < width < review.duration_s - 1e-6:  # else one line goes through both
-        marks.append(_line((review.at_s - review.from_s) / width, _HEIGHT + 2, 15))
-    else:
-        marks.append(_line(review.at_s / max(review.duration_s, 1e-6), _HEIGHT, 17))
-    found = review.found is not None and (review.found.grasps or review.found.writings)
-    shown = marks if found else marks[:1]
+    near = 0.0 < width < review.duration_s - 1e-6
+    marks = []
+    if near:
+        marks.append(_across(review.from_s / end, review.to_s / end, (0, _HEIGHT), _LENS))
+    if review.in_s > 0.0 or review.out_s is not None:
+        marks.append(_across(review.in_s / end, review.end_s / end, _TAKE, _PART))
+    marks.append(_line(review.at_s / end, 0, _HEIGHT))
+    if review.found is not None and (review.found.grasps or review.found.writings):
+        there = (review.at_s - review.from_s) / width if near else review.at_s / end
+        marks.append(_line(there, _HEIGHT + 2, 15))
     return (
         '<div style="position:relative;height:0;z-index:1;pointer-events:none"><div '
-        f'style="position:absolute;top:.1em;left:.75em;right:.75em">{"".join(shown)}</div></div>'
+        f'style="position:absolute;top:.1em;left:.75em;right:.75em">{"".join(marks)}</div></div>'
     )
 
 
@@ -88,11 +106,6 @@ def _parts(review: Review) -> Iterator[str]:
         return at(begin_s), max(at(end_s), at(begin_s) + 2.5)
 
     yield _bar((0.0, _WIDTH), _TAKE, "currentColor", 0.15)
-    if review.from_s > 0.0 or review.to_s < review.duration_s:
-        lens = at(review.from_s), at(review.to_s)
-        yield _bar(lens, (0, _HEIGHT), "currentColor", 0.08, _("in the plots"))
-    if review.in_s > 0.0 or review.out_s is not None:
-        yield _bar((at(review.in_s), at(review.end_s)), _TAKE, "#3b82f6", 0.6)
     for stretch in review.stretches or ():
         row = _HARDLY if stretch.kind in ("impossible", "drift") else _DATA
         span = wide(stretch.start_s, stretch.end_s)
@@ -156,6 +169,13 @@ def _figures() -> dict[StretchKind, str]:
         "impossible": _("{worst:.0f}° beyond"),
         "drift": _("{worst:.0f}° a minute"),
     }
+
+
+def _across(begin: float, end: float, down: tuple[int, int], colour: str) -> str:
+    return (
+        f'<div style="position:absolute;left:{100 * begin:.2f}%;width:{100 * (end - begin):.2f}%;'
+        f'top:{down[0]}px;height:{down[1]}px;background:{colour}"></div>'
+    )
 
 
 def _line(share: float, top: int, height: int) -> str:

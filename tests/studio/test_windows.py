@@ -31,6 +31,7 @@ from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
 from handstudio.process import kept_motion, process, process_head
+from handstudio.recording.notes import with_mark
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
@@ -297,16 +298,21 @@ def test_the_lane_names_grasps_and_writing_of_the_time_in_the_plots(review: Revi
     near = timeline.as_html(reviewing.fitted(part))
     assert ">Tripod 97 %</span>" in near
     assert ">Power sphere 97 %</span>" not in near
+    assert "span" not in lane.as_html(replace(full, from_s=7.5, to_s=8.0))
     assert lane.as_html(replace(review, found=Found())) == ""
 
 
-def test_the_strip_is_made_anew_only_where_more_than_the_playhead_moved(review: Review) -> None:
+def test_the_strip_is_made_anew_only_where_more_is_known_of_the_take(review: Review) -> None:
     later = reviewing.sought(review, 3.0)
-    assert timeline.drawn_from(later) == timeline.drawn_from(review)
-    assert timeline.as_html(later) == timeline.as_html(review)
-    assert timeline.playhead(later) != timeline.playhead(review)
-    for other in (reviewing.zoomed(review, 2.0), reviewing.marked_in(later)):
+    for moved in (later, reviewing.zoomed(review, 2.0), reviewing.marked_in(later)):
+        assert timeline.drawn_from(moved) == timeline.drawn_from(review)
+        assert timeline.strip(moved) == timeline.strip(review)
+        assert timeline.overlay(moved) != timeline.overlay(review)
+    noted = replace(review, notes=with_mark(review.notes, 3.0, "here"))
+    found = replace(review, found=Found((), (grasp("tripod", 3.0, 3.5),)))
+    for other in (noted, found):
         assert timeline.drawn_from(other) != timeline.drawn_from(review)
+        assert timeline.strip(other) != timeline.strip(review)
 
 
 def test_the_strip_tells_what_to_look_at_twice(studio: Studio, path: Path) -> None:
