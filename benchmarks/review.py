@@ -41,7 +41,6 @@ from handstudio.recording.take import open_take
 from handstudio.settings import SettingsStore
 from handstudio.shell import out, print_table, progress
 from handstudio.signals import signals
-from handstudio.survey import survey
 
 ROUND = "quick_start+showcase+open_close+scissors+typing+pouring+grasp:power_sphere"
 TICK_S = 1.0 / 60.0
@@ -96,8 +95,6 @@ def main(
         figures: dict[str, Any] = {"instants": 0}
         shutil.rmtree(path.with_suffix(".motion"), ignore_errors=True)
         fresh = _in_a_fresh_process(path)
-        figures["process_s"] = _timed(lambda: process(open_take(path)))
-        figures["survey_s"] = _timed(lambda: survey(open_take(path)))
         figures["signals_s"] = _timed(lambda: signals(open_take(path)))
         motion = process(open_take(path))
         figures["find_s"] = _timed(lambda: found_in(open_take(path).header.setup, motion))
@@ -250,8 +247,7 @@ def _show(fresh: Opened, known: Opened, figures: dict[str, Any]) -> None:
     ]
     print_table(f"{figures['instants']} instants", ["", "nothing computed", "processed"], rows)
     out.print(
-        "aside: processing {process_s:.1f} s, survey {survey_s:.1f} s, signals {signals_s:.1f} s, "
-        "writing and grasps {find_s:.1f} s".format(**figures)
+        "aside: signals {signals_s:.1f} s, writing and grasps {find_s:.1f} s".format(**figures)
     )
 
 
