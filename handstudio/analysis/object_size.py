@@ -3,6 +3,7 @@
 A finger is a bone with flesh around it; where a thing touches it, the bone's line passes the
 surface at the flesh's thickness, wherever along the bone and round it that is. So the thing's
 radius and place are those that make all these distances right, in the sense of least squares.
+That flesh gives way where it is pressed is left out.
 """
 
 from __future__ import annotations
@@ -25,11 +26,6 @@ _TILT_SD, _EXACT_M = np.deg2rad(12.0), 0.001  # of a bar across the palm; of a d
 _INSTANTS = 15  # of a hold that are looked at
 _OUT_M = (0.0, 0.015, 0.03)  # below the middle of the bones: where the search starts
 _ALONG, _ACROSS = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 1.0])
-_TOO_LARGE_M = 0.0015
-"""Diameters come out too large by this: median of 40 holds of development people 1 to 4 with
-calibrations of their own. Phalanges that boards on skin tell are a millimetre too long, which is
-2.3 mm of a diameter; flesh that gives way where it is pressed takes 1.2 mm of that back."""
-
 _LARGEST_M = 0.080  # radius: more is a wall, not a thing in a hand
 
 _PADS = tuple(f"{finger}_distal" for finger in FINGERS)
@@ -130,7 +126,7 @@ def object_size(
         bones = Bones(start, start + way, flesh)
         found.append(fit(bones, found[-1].solution if found else None))
     radius = np.array([one.radius_m for one in found])
-    diameter = 2.0 * float(np.median(radius)) - _TOO_LARGE_M
+    diameter = 2.0 * float(np.median(radius))
     if not 0.0 < diameter < 2.0 * _LARGEST_M:
         return None
     axis = np.mean([one.axis for one in found], axis=0)
