@@ -19,7 +19,7 @@ class MeasuresFolder:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._send = send
-        self._folder = gui.add_folder(_("Measures"), expand_by_default=False, visible=False)
+        self._folder = gui.add_folder(_("Measures and report"), visible=False)
         with self._folder:
             self._earlier = gui.add_dropdown(
                 _("Earlier visit"),

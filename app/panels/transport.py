@@ -15,6 +15,9 @@ from app.views.recording import clock_of
 from app.views.written import grasp_words, trace_picture
 from app.words import _
 
+WIDTH_PX = 370.0
+"""So wide, and it stands beside plots and the way of working on a page of 1024 pixels."""
+
 _STEP_S = 0.01
 
 
@@ -44,8 +47,8 @@ class TransportPanel:
             )
             self._zoom = gui.add_button_group(
                 _("Plots"),
-                ("−", "+", "◀", "▶", _("Part or all")),
-                hint=_("More or less time, back and on; keys: page up and down, home, end, P"),
+                ("−", "+", "◀", "▶", _("Fit")),
+                hint=_("More or less time, back and on, all; keys: page up and down, home, end, P"),
             )
             self._marks = gui.add_button_group(
                 _("Marks"),
@@ -56,7 +59,7 @@ class TransportPanel:
             self._live = gui.add_button(
                 _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
-        self._panel.float(x=16.0, y=-16.0, width=440.0, height=404.0)
+        self._panel.float(x=12.0, y=-12.0, width=WIDTH_PX, height=404.0)
         self._drawn: object = None
         self._playing = False
         self._written = 0.0
