@@ -399,6 +399,13 @@ class CompareVisits:
 
 
 @dataclass(frozen=True, slots=True)
+class CompareSides:
+    """Hold the measures of the open take against those of the other hand; None: against none."""
+
+    other: Path | None
+
+
+@dataclass(frozen=True, slots=True)
 class MeasureHand:
     """Measure the part of the open take that counts."""
 
@@ -537,6 +544,7 @@ Intent: TypeAlias = (
     | SetLoop
     | Export
     | CompareVisits
+    | CompareSides
     | MeasureHand
     | MakeReport
     | Smooth

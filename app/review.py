@@ -54,6 +54,7 @@ class Review:
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
     earlier: Path | None = None  # the take of an earlier visit that measures are held against
+    other_side: Path | None = None  # and that of the other hand
     measured: Measured | None = None
     signals: Signals | None = None  # None: nobody has asked for them yet
     stretches: tuple[Stretch, ...] | None = None  # None: not known yet
@@ -110,7 +111,7 @@ def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
     """The same take at the same place by another setup, compared with nothing yet."""
     new = opened(review.take, motion, setup)
     names = ["playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare"]
-    names += ["choice", "signals", "earlier"]
+    names += ["choice", "signals", "earlier", "other_side"]
     if not _is(review, 0.0, review.duration_s):
         names += ["from_s", "to_s"]
     same = {name: getattr(review, name) for name in names}

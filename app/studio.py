@@ -196,7 +196,11 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
-            case intents.CompareVisits() | intents.MeasureHand() | intents.MakeReport():
+            case intents.CompareVisits(earlier=earlier):
+                self._compare(earlier=earlier)
+            case intents.CompareSides(other=other):
+                self._compare(other_side=other)
+            case intents.MeasureHand() | intents.MakeReport():
                 self._measure(intent)
             case intents.AddTake(name=name, content=content):
                 self._workshop.add(name, content, self.state.sessions)
@@ -591,22 +595,22 @@ class Studio:
         window = Window(review.in_s, review.out_s)
         self._workshop.export(review.take.path, order, window, review.used)
 
-    def _measure(
-        self, order: intents.CompareVisits | intents.MeasureHand | intents.MakeReport
-    ) -> None:
+    def _compare(self, **with_: Any) -> None:
+        """What was measured without is of no use any more."""
+        review = self.state.review
+        if review is not None:
+            self.state = replace(self.state, review=replace(review, measured=None, **with_))
+
+    def _measure(self, order: intents.MeasureHand | intents.MakeReport) -> None:
         review = self.state.review
         if review is None:
             return
-        part = Window(review.in_s, review.out_s)
+        part, beside = Window(review.in_s, review.out_s), (review.earlier, review.other_side)
         match order:
-            case intents.CompareVisits(earlier=earlier):
-                self.state = replace(
-                    self.state, review=replace(review, earlier=earlier, measured=None)
-                )
             case intents.MeasureHand():
-                self._workshop.measure(review.take, part, review.used, review.earlier)
+                self._workshop.measure(review.take, part, review.used, beside)
             case intents.MakeReport(page=page):
-                self._workshop.report(review.take.path, part, page, review.used, review.earlier)
+                self._workshop.report(review.take.path, part, page, review.used, beside)
 
     def _trim(self, name: str) -> None:
         review = self.state.review

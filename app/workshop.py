@@ -11,7 +11,7 @@ from typing import Any
 
 from app.found import Found
 from app.intents import Export
-from app.jobs import Jobs
+from app.jobs import Beside, Jobs
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
@@ -252,12 +252,10 @@ class Workshop:
         future = self.jobs.export(path, order.format, order.content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
-    def measure(
-        self, take: Take, window: Window, setup: Setup | None, earlier: Path | None
-    ) -> None:
-        """A part of a take, by its own setup or another, against an earlier one."""
+    def measure(self, take: Take, window: Window, setup: Setup | None, beside: Beside) -> None:
+        """A part of a take, by its own setup or another, against other takes."""
         words = _("Measuring {name}").format(name=take.path.stem)
-        future = self.jobs.measure(take.path, window, setup, earlier)
+        future = self.jobs.measure(take.path, window, setup, beside)
         self._pending.append(_Pending(future, lambda found: MeasuredPart(take, found), words))
 
     def report(
@@ -266,7 +264,7 @@ class Workshop:
         window: Window,
         page: int,
         setup: Setup | None = None,
-        earlier: Path | None = None,
+        beside: Beside = (None, None),
     ) -> None:
         """A report of a part of a take, in the language that is spoken, for a page."""
 
@@ -274,7 +272,7 @@ class Workshop:
             return Exported(Download(page, written.name, written))
 
         words = _("Writing the report of {name}").format(name=path.stem)
-        future = self.jobs.report(path, window, setup, earlier, language())
+        future = self.jobs.report(path, window, setup, beside, language())
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:
