@@ -21,7 +21,7 @@ from handstudio.export.formats import FORMATS, format_named
 from handstudio.export.part import Processed, Window
 from handstudio.recording.naming import file_name
 
-NEED_A_HAND = ("mot", "trc", "c3d", "bvh", "glb", "svg")
+NEED_A_HAND = ("mot", "trc", "c3d", "bvh", "glb", "glb-skin", "svg")
 
 
 @contextmanager
@@ -63,7 +63,7 @@ def test_gaps_and_doubts_are_told_with_every_format(into, gappy, name):
     assert told["gaps_s"] == [[2.99, 3.4]]
     assert told["doubtful_s"]["SN17"] == [[0.0, 0.48, "unplaced"]]
     assert "1 gaps, 0.41 s in all" in told["missing"][-1]
-    assert ("in_gaps" in told) == (name in ("bvh", "glb"))
+    assert ("in_gaps" in told) == (name in ("bvh", "glb", "glb-skin"))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits")
@@ -131,7 +131,7 @@ def test_files_lie_beside_the_take_and_are_no_takes(whole, name):
     chosen, take = FORMATS[name], Path("visit/fist.mcap")
     content = chosen.content(None, whole.setup.layout)
     target = chosen.target(take, content)
-    assert target.suffix == f".{name}"
+    assert target.suffix == f".{name.partition('-')[0]}"
     assert target.parent == take.parent
     assert target != take
     if name == "mcap":
