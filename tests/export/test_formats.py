@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import get_args
 
@@ -22,18 +20,6 @@ from handstudio.export.part import Processed, Window
 from handstudio.recording.naming import file_name
 
 NEED_A_HAND = ("mot", "trc", "c3d", "bvh", "glb", "glb-skin", "svg")
-
-
-@contextmanager
-def limit_of_file_size(size: int) -> Iterator[None]:
-    import resource  # noqa: PLC0415 - not on Windows
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_the_shell_offers_every_format():
@@ -68,7 +54,7 @@ def test_gaps_and_doubts_are_told_with_every_format(into, gappy, name):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits")
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_full_disk_leaves_what_was_there_and_no_half_file(into, whole, name):
+def test_a_full_disk_leaves_what_was_there_and_no_half_file(into, whole, name, limit_of_file_size):
     target = into(name, whole, end_s=0.05)
     before = {path.name: path.read_bytes() for path in target.parent.iterdir()}
     limit = max(map(len, before.values())) + 1000
