@@ -24,6 +24,7 @@ GHOST = (138, 146, 158)
 SKIN = (255, 233, 214)  # nobody's: it is to be told from every finger's colour
 SECOND = (132, 184, 255)  # the skin of a hand to compare with
 DOUBT = (96, 102, 112)  # hatching on skin
+HELD = (120, 190, 150)  # a thing in the hand
 LIT = (255, 236, 92)
 
 _CYCLE = (INDEX, THUMB, MIDDLE, LITTLE, RING, WRIST, FOREARM)

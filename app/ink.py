@@ -1,4 +1,4 @@
-"""What was written, in the picture: a page on its plane and the ink that is on it by now."""
+"""What was written, in the picture: desk and page on its plane, and the ink so far."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from handstudio.arrays import Array
 
 _INK_M = 0.0015
 _ABOVE_M = 0.0005  # of the ink over the page, or the two would flicker
-_INK, _PAPER = (37, 99, 235), (250, 250, 245)
-_SEE_THROUGH = 0.35
+_UNDER_M = 0.001  # of the desk under the page, for the same reason
+_INK, _PAPER, _DESK = (37, 99, 235), (250, 250, 245), (150, 122, 92)
+_SEE_THROUGH, _DESK_SEE_THROUGH = 0.35, 0.22
 _FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
 
 
@@ -23,7 +24,7 @@ class InkNodes:
         self._server = server
         self._writing: Writing | None = None
         self._count = -1
-        self._page: viser.MeshHandle | None = None
+        self._sheets: list[viser.MeshHandle] = []  # desk and page
         self._ink: viser.LineSegmentsHandle | None = None
 
     def render(self, view: TraceView | None) -> None:
@@ -34,25 +35,34 @@ class InkNodes:
         if view.writing is not self._writing:
             self.clear()
             self._writing = view.writing
-            self._page = self._server.scene.add_mesh_simple(
-                "/hand/page",
-                view.page,
-                _FACES,
-                color=_PAPER,
-                opacity=_SEE_THROUGH,
-                side="double",
-                cast_shadow=False,
-            )
+            under = _UNDER_M * view.writing.plane.normal
+            self._sheets = [
+                self._sheet("desk", view.desk - under, _DESK, _DESK_SEE_THROUGH),
+                self._sheet("page", view.page, _PAPER, _SEE_THROUGH),
+            ]
         if view.count != self._count:
             self._count = view.count
             self._draw(view.lines + _ABOVE_M * view.writing.plane.normal)
 
     def clear(self) -> None:
-        """Take page and ink away."""
-        for handle in (self._page, self._ink):
+        """Take desk, page and ink away."""
+        for handle in (*self._sheets, self._ink):
             if handle is not None:
                 handle.remove()
-        self._page, self._ink, self._writing, self._count = None, None, None, -1
+        self._sheets, self._ink, self._writing, self._count = [], None, None, -1
+
+    def _sheet(
+        self, name: str, corners: Array, colour: tuple[int, int, int], opacity: float
+    ) -> viser.MeshHandle:
+        return self._server.scene.add_mesh_simple(
+            f"/hand/{name}",
+            corners,
+            _FACES,
+            color=colour,
+            opacity=opacity,
+            side="double",
+            cast_shadow=False,
+        )
 
     def _draw(self, lines: Array) -> None:
         if self._ink is not None:

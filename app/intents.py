@@ -272,6 +272,11 @@ class RestoreTake:
 
 
 @dataclass(frozen=True, slots=True)
+class ComputeRest:
+    """Of the open take only the first seconds are there: compute the rest after all."""
+
+
+@dataclass(frozen=True, slots=True)
 class CancelWork:
     """The long work that is on is no longer wanted."""
 
@@ -402,6 +407,13 @@ class CompareVisits:
 
 
 @dataclass(frozen=True, slots=True)
+class CompareSides:
+    """Hold the measures of the open take against those of the other hand; None: against none."""
+
+    other: Path | None
+
+
+@dataclass(frozen=True, slots=True)
 class MeasureHand:
     """Measure the part of the open take that counts."""
 
@@ -512,6 +524,7 @@ Intent: TypeAlias = (
     | BinTake
     | Undo
     | RestoreTake
+    | ComputeRest
     | CancelWork
     | EmptyBin
     | DeleteSubject
@@ -540,6 +553,7 @@ Intent: TypeAlias = (
     | SetLoop
     | Export
     | CompareVisits
+    | CompareSides
     | MeasureHand
     | MakeReport
     | Smooth

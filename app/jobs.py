@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
+from typing import TypeAlias
 
 from app.found import Found, found_in
 from app.report.make import report_of, report_path, save_report
@@ -26,6 +27,9 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+
+Beside: TypeAlias = tuple[Path | None, Path | None]
+"""The takes that measures are held against: an earlier one, and one of the other hand."""
 
 # In the job's process: where it tells how far it is, and whether it is to stop.
 _share: Synchronized[float] | None = None
@@ -77,18 +81,18 @@ class Jobs:
         return self._pool.submit(_export, path, name, content, window, setup)
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None
+        self, path: Path, window: Window, setup: Setup | None, beside: Beside
     ) -> Future[Measured]:
-        """Measure a part of a take, and compare with an earlier one."""
+        """Measure a part of a take, and compare it."""
         self._reset()
-        return self._pool.submit(_measure, path, window, setup, earlier)
+        return self._pool.submit(_measure, path, window, setup, beside)
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
+        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
     ) -> Future[Path]:
         """Write a report of a part of a take, beside it."""
         self._reset()
-        return self._pool.submit(_report, path, window, setup, earlier, language)
+        return self._pool.submit(_report, path, window, setup, beside, language)
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
         """Look for what was written and grasped in the motion of a take, where that is kept."""
@@ -184,17 +188,23 @@ def _export(
     return export(source, target, chosen, content=kind, window=window, progress=_tell)
 
 
-def _measure(path: Path, window: Window, setup: Setup | None, earlier: Path | None) -> Measured:
-    before = None if earlier is None else open_take(earlier)
-    return measure(open_take(path), setup, window, earlier=before, progress=_tell)
+def _measure(path: Path, window: Window, setup: Setup | None, beside: Beside) -> Measured:
+    earlier, other = (None if one is None else open_take(one) for one in beside)
+    return measure(
+        open_take(path), setup, window, earlier=earlier, other_side=other, progress=_tell
+    )
 
 
-def _report(
-    path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
-) -> Path:
-    before = None if earlier is None else open_take(earlier)
+def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, language: str) -> Path:
+    earlier, other = (None if one is None else open_take(one) for one in beside)
     made = report_of(
-        open_take(path), setup, window, earlier=before, language=language, progress=_tell
+        open_take(path),
+        setup,
+        window,
+        earlier=earlier,
+        other_side=other,
+        language=language,
+        progress=_tell,
     )
     return save_report(made.html, report_path(path, language))
 

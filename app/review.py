@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -23,6 +24,9 @@ from handstudio.signals import Signals
 
 _NARROWEST_S = 0.2  # of time in the plots: a few instants
 _LEAD = 0.1  # share of the plots before the playhead, where it has played out of them
+
+Rest: TypeAlias = Literal["here", "coming", "missing"]
+"""What is beyond the first seconds: there, being computed, or not, as that stopped or failed."""
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
@@ -50,17 +54,23 @@ class Review:
     compare: str = ""  # and compared with this one, or nothing
     comparison: Comparison | None = None
     earlier: Path | None = None  # the take of an earlier visit that measures are held against
+    other_side: Path | None = None  # and that of the other hand
     measured: Measured | None = None
     signals: Signals | None = None  # None: nobody has asked for them yet
     stretches: tuple[Stretch, ...] | None = None  # None: not known yet
     found: Found | None = None  # what was written and grasped; None: not known yet
     ordered: frozenset[str] = frozenset()  # which of these are on their way
-    partial: bool = False  # only the first seconds are there yet
+    rest: Rest = "here"
 
     @property
     def setup(self) -> Setup:
         """What decided this motion."""
         return self.used or self.take.header.setup
+
+    @property
+    def partial(self) -> bool:
+        """Only the first seconds are there."""
+        return self.rest != "here"
 
     @property
     def duration_s(self) -> float:
@@ -101,7 +111,7 @@ def computed_by(review: Review, setup: Setup, motion: Motion) -> Review:
     """The same take at the same place by another setup, compared with nothing yet."""
     new = opened(review.take, motion, setup)
     names = ["playing", "speed", "in_s", "out_s", "loop", "notes", "smooth", "compare"]
-    names += ["choice", "signals", "earlier"]
+    names += ["choice", "signals", "earlier", "other_side"]
     if not _is(review, 0.0, review.duration_s):
         names += ["from_s", "to_s"]
     same = {name: getattr(review, name) for name in names}

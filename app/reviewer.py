@@ -46,16 +46,16 @@ class Reviewer:
             self.opening = None
             return reviewing.opened(take, motion)
         self.opening = take.path
-        self.workshop.compute(take)
-        if preview:
+        if preview:  # first: somebody waits for it
             self.workshop.preview(take)
+        self.workshop.compute(take)
         return None
 
     def head(self, take: Take, motion: Motion) -> Review | None:
         """The first seconds, where they are still waited for."""
-        if take.path != self.opening or len(motion) == 0 or kept_motion(take) is not None:
+        if take.path != self.opening or len(motion) == 0:
             return None
-        return replace(reviewing.opened(take, motion), partial=True)
+        return replace(reviewing.opened(take, motion), rest="coming")
 
     def computed(self, take: Take, review: Review | None) -> Review | None:
         """All of a take that was computed, in the place of what was shown of it; None: not wanted.
@@ -74,6 +74,21 @@ class Reviewer:
             return reviewing.computed_by(review, take.header.setup, motion)
         return review
 
+    def uncomputed(self, take: Take, review: Review | None) -> Review | None:
+        """What is shown of a take whose computing was stopped or failed; None: nothing changes."""
+        if take.path == self.opening:
+            self.opening = None
+        if review is None or review.take.path != take.path or not review.partial:
+            return None
+        return replace(review, rest="missing")
+
+    def completed(self, review: Review) -> Review:
+        """With the rest of its take ordered, where that is missing."""
+        if review.rest != "missing":
+            return review
+        self.workshop.compute(review.take)
+        return replace(review, rest="coming")
+
     def brought(self, review: Review) -> Review:
         """With the motions that are asked for, as far as they are there; others are ordered.
 
@@ -87,7 +102,8 @@ class Reviewer:
             if motion is not None:
                 review = reviewing.computed_by(review, wanted, motion)
         if not review.compare:
-            review = replace(review, comparison=None)
+            if review.comparison is not None:
+                review = reviewing.seen_anew(replace(review, comparison=None))
         elif review.comparison is None or review.comparison.name != review.compare:
             review = self._beside(review)
         return self._looked_through(review)
@@ -110,10 +126,12 @@ class Reviewer:
         layout = review.setup.layout
         chosen = self.curves if self.curves in sets_of(layout) else OVERVIEW
         sensor = layout.names.index(self.sensor) if self.sensor in layout.names else 0
+        before = review
         review = replace(review, choice=Choice(chosen, sensor))
         if not review.partial:  # else all of it is on its way, and these afterwards
             review = self._ordered(review)
-        return reviewing.seen_anew(review)
+        same = review.choice == before.choice and review.signals is before.signals
+        return review if same else reviewing.seen_anew(review)
 
     def _ordered(self, review: Review) -> Review:
         """With what is kept of signals, stretches and finds; what is not is ordered, once."""

@@ -42,6 +42,7 @@ from app.workshop import (
     Surveyed,
     Trimmed,
     Uncomputed,
+    Unseen,
     Workshop,
     Written,
 )
@@ -195,7 +196,11 @@ class Studio:
                 self.state = replace(self.state, review=None, yaw=None)
             case intents.Export():
                 self._export(intent)
-            case intents.CompareVisits() | intents.MeasureHand() | intents.MakeReport():
+            case intents.CompareVisits(earlier=earlier):
+                self._compare(earlier=earlier)
+            case intents.CompareSides(other=other):
+                self._compare(other_side=other)
+            case intents.MeasureHand() | intents.MakeReport():
                 self._measure(intent)
             case intents.AddTake(name=name, content=content):
                 self._workshop.add(name, content, self.state.sessions)
@@ -208,6 +213,10 @@ class Studio:
                 self._ask_of_review(smooth=on)
             case intents.Compare(name=name):
                 self._ask_of_review(compare=name)
+            case intents.ComputeRest():
+                if self.state.review is not None:
+                    rest = self._reviewer.completed(self.state.review)
+                    self.state = replace(self.state, review=rest)
             case intents.CancelWork():
                 self._workshop.cancel()
             case intents.SendDiagnostics(page=page):
@@ -590,22 +599,22 @@ class Studio:
         window = Window(review.in_s, review.out_s)
         self._workshop.export(review.take.path, order, window, review.used)
 
-    def _measure(
-        self, order: intents.CompareVisits | intents.MeasureHand | intents.MakeReport
-    ) -> None:
+    def _compare(self, **with_: Any) -> None:
+        """What was measured without is of no use any more."""
+        review = self.state.review
+        if review is not None:
+            self.state = replace(self.state, review=replace(review, measured=None, **with_))
+
+    def _measure(self, order: intents.MeasureHand | intents.MakeReport) -> None:
         review = self.state.review
         if review is None:
             return
-        part = Window(review.in_s, review.out_s)
+        part, beside = Window(review.in_s, review.out_s), (review.earlier, review.other_side)
         match order:
-            case intents.CompareVisits(earlier=earlier):
-                self.state = replace(
-                    self.state, review=replace(review, earlier=earlier, measured=None)
-                )
             case intents.MeasureHand():
-                self._workshop.measure(review.take, part, review.used, review.earlier)
+                self._workshop.measure(review.take, part, review.used, beside)
             case intents.MakeReport(page=page):
-                self._workshop.report(review.take.path, part, page, review.used, review.earlier)
+                self._workshop.report(review.take.path, part, page, review.used, beside)
 
     def _trim(self, name: str) -> None:
         review = self.state.review
@@ -666,7 +675,7 @@ class Studio:
         except HandstudioError as error:
             self._say(error)
 
-    def _finish_work(self) -> None:  # noqa: PLR0912 - a list
+    def _finish_work(self) -> None:  # noqa: PLR0912, PLR0915 - a list
         for outcome in self._workshop.done():
             match outcome:
                 case Computed(take=take, setup=None):
@@ -688,11 +697,18 @@ class Studio:
                 case Trimmed(path=path):
                     self._tell(_("Trimmed: {name} is a take of its own.").format(name=path.stem))
                     self.refresh_takes()
+                case Uncomputed(take=take, error=error, own=True):
+                    self._tell_why(error)
+                    shown = self._reviewer.uncomputed(take, self.state.review)
+                    self.state = replace(self.state, review=shown or self.state.review)
                 case Uncomputed(take=take, error=error):
                     self._tell_why(error)
                     here = self._is_open(take) or self._is_beside(take)
                     if here and self.state.review is not None:
                         self._bring(reviewing.settled(self.state.review))
+                case Unseen(take=take, what=what, error=error):
+                    self._tell_why(error)
+                    self._forget_order(take, what)
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)
@@ -712,7 +728,21 @@ class Studio:
                     self._tell_why(outcome)
                 case _:
                     pass  # of a take that is no longer open
+            self._complete()
         self.state = replace(self.state, work=self._workshop.work)
+
+    def _forget_order(self, take: Take, what: str) -> None:
+        review = self.state.review
+        if review is not None and self._is_open(take):
+            self.state = replace(
+                self.state, review=replace(review, ordered=review.ordered - {what})
+            )
+
+    def _complete(self) -> None:
+        """An export, too, may have computed what was missing of the open take."""
+        review = self.state.review
+        if review is not None and review.rest == "missing":
+            self._show_computed(review.take)
 
     def _use(self, answer: Answer | HandstudioError) -> None:
         """What a course was for, from now on."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from app.found import Found
 from app.intents import Export
-from app.jobs import Jobs
+from app.jobs import Beside, Jobs
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
@@ -40,9 +40,19 @@ class Computed:
 
 @dataclass(frozen=True, slots=True)
 class Uncomputed:
-    """The motion of this take by another setup will not be there, and why not."""
+    """The motion of this take, by its own setup or another, will not be there, and why not."""
 
     take: Take
+    error: HandstudioError
+    own: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """Something about this take (as `Review.ordered` names it) will not be known, and why not."""
+
+    take: Take
+    what: str
     error: HandstudioError
 
 
@@ -122,7 +132,7 @@ class FoundIn:
     found: Found
 
 
-Outcome = (Computed | Uncomputed | Previewed | Surveyed | Written | MeasuredPart) | (
+Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
     FoundIn | Trimmed | Added | Exported | Gathered | Solved
 )
 
@@ -154,7 +164,11 @@ class Workshop:
         """The motion of a take."""
         words = _("Computing the motion of {name}").format(name=take.path.stem)
         future = self.jobs.process(take.path)
-        self._pending.append(_Pending(future, lambda _result: Computed(take), words))
+
+        def fail(error: HandstudioError) -> Outcome:
+            return Uncomputed(take, error, own=True)
+
+        self._pending.append(_Pending(future, lambda _result: Computed(take), words, fail))
 
     def compute_by(self, take: Take, setup: Setup) -> None:
         """The motion of a take by another setup."""
@@ -175,13 +189,14 @@ class Workshop:
 
         words = _("Looking for writing and grasps in {name}").format(name=take.path.stem)
         future = self.jobs.find(take.path, setup)
-        self._pending.append(_Pending(future, use, words))
+        fail = _unseen(take, "found")
+        self._pending.append(_Pending(future, use, words, fail))
 
     def preview(self, take: Take) -> None:
         """The first seconds of a take, beside the computing of all of it."""
         future = self._aside.submit(process_head, take)
         words = _("Computing the motion of {name}").format(name=take.path.stem)
-        # behind what is waited for: its share is that of the whole
+        # in the same words as the whole, whose share it tells
         self._pending.append(_Pending(future, lambda motion: Previewed(take, motion), words))
 
     def look_through(self, take: Take, setup: Setup | None) -> None:
@@ -191,13 +206,15 @@ class Workshop:
         def use(found: tuple[Stretch, ...]) -> Outcome:
             return Surveyed(take, setup, found)
 
-        self._pending.append(_Pending(self.jobs.survey(take.path, setup), use, words))
+        future, fail = self.jobs.survey(take.path, setup), _unseen(take, "stretches")
+        self._pending.append(_Pending(future, use, words, fail))
 
     def write_signals(self, take: Take) -> None:
         """What the sensors of a take told."""
         words = _("Reading the signals of {name}").format(name=take.path.stem)
         future = self.jobs.signals(take.path)
-        self._pending.append(_Pending(future, lambda _result: Written(take), words))
+        fail = _unseen(take, "signals")
+        self._pending.append(_Pending(future, lambda _result: Written(take), words, fail))
 
     def trim(self, path: Path, begin_s: float, end_s: float | None, name: str) -> None:
         """A part of a take as a take of its own."""
@@ -236,12 +253,10 @@ class Workshop:
         future = self.jobs.export(path, order.format, order.content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
-    def measure(
-        self, take: Take, window: Window, setup: Setup | None, earlier: Path | None
-    ) -> None:
-        """A part of a take, by its own setup or another, against an earlier one."""
+    def measure(self, take: Take, window: Window, setup: Setup | None, beside: Beside) -> None:
+        """A part of a take, by its own setup or another, against other takes."""
         words = _("Measuring {name}").format(name=take.path.stem)
-        future = self.jobs.measure(take.path, window, setup, earlier)
+        future = self.jobs.measure(take.path, window, setup, beside)
         self._pending.append(_Pending(future, lambda found: MeasuredPart(take, found), words))
 
     def report(
@@ -250,7 +265,7 @@ class Workshop:
         window: Window,
         page: int,
         setup: Setup | None = None,
-        earlier: Path | None = None,
+        beside: Beside = (None, None),
     ) -> None:
         """A report of a part of a take, in the language that is spoken, for a page."""
 
@@ -258,7 +273,7 @@ class Workshop:
             return Exported(Download(page, written.name, written))
 
         words = _("Writing the report of {name}").format(name=path.stem)
-        future = self.jobs.report(path, window, setup, earlier, language())
+        future = self.jobs.report(path, window, setup, beside, language())
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:
@@ -298,6 +313,10 @@ class Workshop:
                     reason=repr(error),
                 )
                 yield one.fail(failed)
+
+
+def _unseen(take: Take, what: str) -> Callable[[HandstudioError], Outcome]:
+    return lambda error: Unseen(take, what, error)
 
 
 def _taken_in(name: str, content: bytes | None, sessions: Path) -> Path:

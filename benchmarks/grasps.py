@@ -76,7 +76,7 @@ def main(
             )
             rows += compared(person, follow(trial), calibration)
             share(number / len(people))
-    found = summed(rows) | {"people": list(people), "grasps": rows}
+    found = summed(rows) | {"people": list(people), "rows": rows}
     _show(found)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)

@@ -240,6 +240,7 @@ def report(
     take: TakeFile,
     *,
     earlier: Path | None = None,
+    other_side: Path | None = None,
     language: Literal["en", "ja"] = "en",
     pdf: bool = False,
     to: Path | None = None,
@@ -254,6 +255,7 @@ def report(
     Args:
         take: The take.
         earlier: A take of an earlier visit of the same hand, to compare with.
+        other_side: A take of the other hand of the same person: ranges and scores as shares of its.
         language: English or Japanese.
         pdf: Also print it to PDF, by a Chromium, Chrome or Edge of this machine.
         to: The file to write; beside the take unless given.
@@ -275,6 +277,7 @@ def report(
             setup,
             Window(start_s, end_s),
             earlier=None if earlier is None else open_take(earlier),
+            other_side=None if other_side is None else open_take(other_side),
             language=language,
             progress=share,
         )

@@ -8,12 +8,14 @@ from typing import TypeAlias
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from handstudio import __version__
 from handstudio.analysis.change import Change, changes
 from handstudio.analysis.measure import Measure, missing
 from handstudio.analysis.posture_time import DEFAULT_BANDS, Band
 from handstudio.analysis.series import series_of
+from handstudio.analysis.sides import SideRatio, against_other_side
 from handstudio.analysis.whole import Asked, measures_of
 from handstudio.errors import TakeError
 from handstudio.export.part import Window, cut
@@ -72,12 +74,16 @@ class Measured(msgspec.Struct, frozen=True):
         measures: All of them, also those that cannot be given, and why.
         earlier: What it is compared with.
         changes: Of every measure that both have.
+        other_side: The take of the other hand it is held against.
+        sides: Ranges and scores as shares of that hand's.
     """
 
     visit: Visit
     measures: tuple[Measure, ...]
     earlier: Visit | None = None
     changes: tuple[Change, ...] = ()
+    other_side: Visit | None = None
+    sides: tuple[SideRatio, ...] = ()
 
 
 def measure(
@@ -86,6 +92,7 @@ def measure(
     window: Window | None = None,
     *,
     earlier: Take | None = None,
+    other_side: Take | None = None,
     bands: Sequence[Band] = DEFAULT_BANDS,
     progress: Progress = lambda _: None,
 ) -> Measured:
@@ -96,21 +103,34 @@ def measure(
         setup: Another setup than the take's own.
         window: The part; all of it unless given.
         earlier: A take of the same hand of the same person.
+        other_side: A take of the other hand of the same person; all of it is measured.
         bands: Postures whose time is counted.
         progress: Told how far it is.
 
     Raises:
-        TakeError: the part holds no instant, a take cannot be read, or the earlier one is of
-            another hand.
+        TakeError: the part holds no instant, a take cannot be read, the earlier one is of
+            another hand, or the other side's of the same or somebody else's.
     """
     if earlier is not None:
         _refuse_strangers(take, earlier)
-    share = 1.0 if earlier is None else 0.5
-    visit, found = _one(take, setup, window, bands, lambda done: progress(share * done))
-    if earlier is None:
-        return Measured(visit, tuple(found))
-    before, old = _one(earlier, None, None, bands, lambda done: progress(0.5 + 0.5 * done))
-    return Measured(visit, tuple(found), before, tuple(changes(old, found)))
+    if other_side is not None:
+        _refuse_same_side(take, other_side)
+    beside = [one for one in (earlier, other_side) if one is not None]
+    share = 1.0 / (1 + len(beside))
+
+    def part_of(turn: int) -> Progress:
+        return lambda done: progress(share * (turn + done))
+
+    visit, found = _one(take, setup, window, bands, part_of(0))
+    measured = Measured(visit, tuple(found))
+    if earlier is not None:
+        before, old = _one(earlier, None, None, bands, part_of(1))
+        measured = replace(measured, earlier=before, changes=tuple(changes(old, found)))
+    if other_side is not None:
+        other, theirs = _one(other_side, None, None, bands, part_of(len(beside)))
+        sides = tuple(against_other_side(found, theirs))
+        measured = replace(measured, other_side=other, sides=sides)
+    return measured
 
 
 def band_of(text: str) -> Band:
@@ -206,4 +226,19 @@ def _refuse_strangers(take: Take, earlier: Take) -> None:
             "Name the earlier one as the earlier one.",
             earlier=earlier.path.name,
             take=take.path.name,
+        )
+
+
+def _refuse_same_side(take: Take, other: Take) -> None:
+    sides = {take.header.setup.layout.side, other.header.setup.layout.side}
+    if take.header.subject != other.header.subject or sides != {"left", "right"}:
+        raise TakeError(
+            "{other} is of {whose} ({other_side}), {take} of {subject} ({side}).",
+            "Compare with a take of the other hand of the same person.",
+            other=other.path.name,
+            whose=other.header.subject,
+            other_side=other.header.setup.layout.side,
+            take=take.path.name,
+            subject=take.header.subject,
+            side=take.header.setup.layout.side,
         )

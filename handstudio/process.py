@@ -111,6 +111,8 @@ def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
     """
     own = take.header.setup
     chosen = setup or own
+    if not _home(take.path).exists():  # found without hashing a long take, which takes its time
+        return None
     return _opened(motion_folder(take, chosen, from_start=chosen != own))
 
 
@@ -132,7 +134,12 @@ def motion_folder(take: Take, setup: Setup, from_start: bool) -> Path:
     """Where the motion of a take under a setup is kept."""
     parts = f"{take.sha256()} {setup.key} {__version__} {from_start}"
     key = hashlib.sha256(parts.encode()).hexdigest()[:16]
-    return take.path.with_suffix(".motion") / key
+    return _home(take.path) / key
+
+
+def _home(take: Path) -> Path:
+    """What is computed of a take lies in here."""
+    return take.with_suffix(".motion")
 
 
 def _refuse_other_sensors(take: Take, setup: Setup) -> None:
@@ -156,7 +163,7 @@ class MotionWriter:
     def __init__(self, beside: Path, sensors: int) -> None:
         self._sensors = sensors
         self._count = 0
-        home = beside.with_suffix(".motion")
+        home = _home(beside)
         home.mkdir(parents=True, exist_ok=True)
         self._folder = Path(tempfile.mkdtemp(prefix="unfinished-", dir=home))
         self._files = {name: (self._folder / name).open("wb") for name in _KINDS}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import hypothesis
@@ -77,3 +78,21 @@ def data_dir() -> Path:
 
 def _no_data() -> str:
     return f"needs recordings of real sensors: set {DATA_VARIABLE} to their folder"
+
+
+@pytest.fixture
+def limit_of_file_size() -> Callable[[int], AbstractContextManager[None]]:
+    """As long as it lasts no file may grow beyond so many bytes; not on Windows."""
+    return _limited
+
+
+@contextmanager
+def _limited(size: int) -> Iterator[None]:
+    import resource  # noqa: PLC0415 - not on Windows
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

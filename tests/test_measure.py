@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from handstudio.analysis.measure import Measure
+from handstudio.analysis.sides import against_other_side
 from handstudio.errors import TakeError
 from handstudio.export.part import Window
 from handstudio.kinematics import angles_of
@@ -91,6 +92,38 @@ def test_the_same_hand_twice_has_not_changed(takes):
 def test_strangers_and_later_takes_are_not_compared(takes, take, earlier, what):
     with pytest.raises(TakeError, match=what):
         measure(takes[take], earlier=takes[earlier])
+
+
+def test_a_hand_is_held_against_the_other_one(takes):
+    now, left = measure(takes["now"]), measure(takes["left"])
+    measured = measure(takes["now"], earlier=takes["before"], other_side=takes["left"])
+    assert measured.changes == measure(takes["now"], earlier=takes["before"]).changes
+    assert measured.other_side.take == "left"
+    shares = {(one.kind, one.about): one for one in measured.sides}
+    for about in ("index", "little"):
+        one = shares["tam", about]
+        mine, theirs = found(now, "tam", about), found(left, "tam", about)
+        assert one.percent == pytest.approx(100.0 * mine.value / theirs.value)
+        assert one.percent == pytest.approx(100.0, abs=10.0)  # the same exercise with both
+        assert one.sd > 100.0 * mine.sd / theirs.value
+        assert one.grade in ("excellent", "good")
+    assert {kind for kind, _ in shares} == {"range", "tam", "strickland"}
+    assert msgspec.json.decode(msgspec.json.encode(measured), type=Measured) == measured
+    with pytest.raises(TakeError, match="other hand of the same person"):
+        measure(takes["now"], other_side=takes["before"])
+
+
+def test_a_share_of_next_to_nothing_is_not_given_and_grades_follow_the_share():
+    def tam(value, sd=2.0):
+        return Measure("tam", "index", value, "deg", sd=sd)
+
+    (half,) = against_other_side([tam(120.0)], [tam(240.0)])
+    assert (half.percent, half.grade) == (50.0, "poor")
+    assert half.sd == pytest.approx(100.0 * np.hypot(2.0, 1.0) / 240.0)
+    assert against_other_side([tam(240.0)], [tam(239.9)])[0].grade == "excellent"
+    assert against_other_side([tam(239.0)], [tam(240.0, None)])[0].sd is None
+    assert against_other_side([tam(120.0)], [tam(4.0)]) == []
+    assert against_other_side([Measure("mean_speed", "a", 30.0, "deg/s")] * 2, []) == []
 
 
 def test_notes_that_cannot_be_read_do_not_keep_a_take_from_being_measured(tmp_path):

@@ -37,6 +37,9 @@ class LibraryPanel:
         )
         self._choice = gui.add_dropdown(_("Take"), (_("Choose a take"),))
         self._facts = gui.add_markdown("")
+        self._rest = gui.add_button(
+            _("Compute the rest"), icon=viser.Icon.PLAYER_TRACK_NEXT, visible=False
+        )
         self._recover = gui.add_button(
             _("Recover this recording"), icon=viser.Icon.LIFEBUOY, visible=False
         )
@@ -49,6 +52,7 @@ class LibraryPanel:
         self._opened: Path | None = None
         self._search.on_update(typed(lambda text: send(intents.Search(text))))
         self._choice.on_update(typed(self._chosen))
+        self._rest.on_click(lambda _event: send(intents.ComputeRest()))
         self._recover.on_click(lambda _event: self._ask_recovery())
 
     def render(self, state: State) -> None:
@@ -66,6 +70,7 @@ class LibraryPanel:
         entry = self._labels.get(self._choice.value)
         interrupted = entry is not None and entry.take is None and not entry.recording
         put(self._recover, visible=interrupted and review is None)
+        put(self._rest, visible=review is not None and review.rest == "missing")
         self._export.render(review)
         self._motion.render(review, state.shelf.found)
         self._measures.render(state)

@@ -19,12 +19,17 @@ class MeasuresFolder:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._send = send
-        self._folder = gui.add_folder(_("Measures"), expand_by_default=False, visible=False)
+        self._folder = gui.add_folder(_("Measures and report"), visible=False)
         with self._folder:
             self._earlier = gui.add_dropdown(
                 _("Earlier visit"),
                 (view.none_words(),),
                 hint=_("A take of the same hand to compare with"),
+            )
+            self._other = gui.add_dropdown(
+                _("Other hand"),
+                (view.none_words(),),
+                hint=_("A take of the other hand: ranges and scores as shares of its"),
             )
             self._measure = gui.add_button(
                 _("Measure this part"), icon=viser.Icon.RULER_MEASURE, color=QUIET
@@ -44,9 +49,13 @@ class MeasuresFolder:
             self._close = gui.add_button(_("Close"), color=QUIET)
         self._sheet.float(x=350.0, y=16.0, width=820.0, height=640.0)
         self._takes: dict[str, Path] = {}
+        self._others: dict[str, Path] = {}
         self._shown: Measured | None = None
         self._earlier.on_update(
             typed(lambda words: send(intents.CompareVisits(self._takes.get(words))))
+        )
+        self._other.on_update(
+            typed(lambda words: send(intents.CompareSides(self._others.get(words))))
         )
         self._measure.on_click(lambda _event: send(intents.MeasureHand()))
         self._all.on_click(lambda _event: self._show_all())
@@ -61,12 +70,10 @@ class MeasuresFolder:
             put(self._sheet, visible=False)
         if review is None:
             return
-        self._takes = view.earlier_takes(state)
-        options = (view.none_words(), *self._takes)
-        if self._earlier.options != options:
-            self._earlier.options = options
-        chosen = [words for words, path in self._takes.items() if path == review.earlier]
-        put(self._earlier, value=chosen[0] if chosen else view.none_words())
+        self._takes, self._others = view.earlier_takes(state), view.other_hand(state)
+        _offer(self._earlier, self._takes, review.earlier)
+        _offer(self._other, self._others, review.other_side)
+        put(self._other, visible=bool(self._others))
         if review.measured is not self._shown:
             self._shown = review.measured
             put(self._sheet, visible=False)
@@ -77,3 +84,13 @@ class MeasuresFolder:
         if self._shown is not None:
             put(self._full, content=view.full_html(self._shown))
             put(self._sheet, visible=True)
+
+
+def _offer(
+    choice: viser.GuiDropdownHandle[str], takes: dict[str, Path], chosen: Path | None
+) -> None:
+    options = (view.none_words(), *takes)
+    if choice.options != options:
+        choice.options = options
+    words = [words for words, path in takes.items() if path == chosen]
+    put(choice, value=words[0] if words else view.none_words())

@@ -15,6 +15,9 @@ from app.views.recording import clock_of
 from app.views.written import grasp_words, trace_picture
 from app.words import _
 
+WIDTH_PX = 370.0
+"""So wide, and it stands beside plots and the way of working on a page of 1024 pixels."""
+
 _STEP_S = 0.01
 
 
@@ -24,7 +27,9 @@ class TransportPanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab(_("Replay"), viser.Icon.TIMELINE):
+            self._overlay = gui.add_html("")
             self._strip = gui.add_html("")
+            self._below = gui.add_html("")
             self._written_page = gui.add_html("", visible=False)
             self._time = gui.add_slider(_("Time [s]"), 0.0, 1.0, _STEP_S, 0.0)
             self._clock = gui.add_markdown("")
@@ -42,8 +47,8 @@ class TransportPanel:
             )
             self._zoom = gui.add_button_group(
                 _("Plots"),
-                ("−", "+", "◀", "▶", _("Part or all")),
-                hint=_("More or less time, back and on; keys: page up and down, home, end, P"),
+                ("−", "+", "◀", "▶", _("Fit")),
+                hint=_("More or less time, back and on, all; keys: page up and down, home, end, P"),
             )
             self._marks = gui.add_button_group(
                 _("Marks"),
@@ -54,7 +59,8 @@ class TransportPanel:
             self._live = gui.add_button(
                 _("Back to the live hand"), icon=viser.Icon.HAND_STOP, color=QUIET
             )
-        self._panel.float(x=16.0, y=-16.0, width=440.0, height=404.0)
+        self._panel.float(x=12.0, y=-12.0, width=WIDTH_PX, height=404.0)
+        self._drawn: object = None
         self._playing = False
         self._written = 0.0
         self._time.on_update(typed(lambda at_s: send(intents.Seek(at_s))))
@@ -89,7 +95,12 @@ class TransportPanel:
         if review is None:
             return
         self._render_time(review)
-        put(self._strip, content=timeline.as_svg(review))
+        put(self._overlay, content=timeline.overlay(review))
+        drawn = timeline.drawn_from(review)
+        if drawn != self._drawn:
+            self._drawn = drawn
+            put(self._strip, content=timeline.strip(review))
+        put(self._below, content=timeline.below(review))
         picture = trace_picture(review)
         put(self._written_page, content=picture, visible=bool(picture))
         put(self._clock, content=_here(review))

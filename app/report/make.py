@@ -58,6 +58,7 @@ def report_of(
     window: Window | None = None,
     *,
     earlier: Take | None = None,
+    other_side: Take | None = None,
     language: str = "en",
     progress: Progress = lambda _share: None,
 ) -> Report:
@@ -71,7 +72,12 @@ def report_of(
     """
     words.use_language(language)
     measured = measure(
-        take, setup, window, earlier=earlier, progress=lambda done: progress(0.8 * done)
+        take,
+        setup,
+        window,
+        earlier=earlier,
+        other_side=other_side,
+        progress=lambda done: progress(0.8 * done),
     )
     chosen = setup or take.header.setup
     motion = process(take, chosen)
@@ -122,6 +128,7 @@ def _page(
         "title": _("Report of a hand"),
         "facts": _facts(take, setup, measured.visit, recorded),
         "earlier": None if measured.earlier is None else _earlier(measured.earlier),
+        "other_side": None if measured.other_side is None else _other_side(measured.other_side),
         "warnings": _warnings(setup, measured.visit),
         "tables": tables_of(measured) if hand else [],
         "ranges": Markup(ranges_chart(measured.measures, _before(measured))),
@@ -184,6 +191,12 @@ def _facts(take: Take, setup: Setup, visit: Visit, recorded: datetime) -> list[t
 def _earlier(earlier: Visit) -> str:
     return _("Compared with {take} of {visit}, calibration {calibration}.").format(
         take=earlier.take, visit=earlier.visit, calibration=_calibration(earlier)
+    )
+
+
+def _other_side(other: Visit) -> str:
+    return _("The other hand: {take} of {visit}, calibration {calibration}.").format(
+        take=other.take, visit=other.visit, calibration=_calibration(other)
     )
 
 

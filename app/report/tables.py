@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from app.report.names import (
     about_name,
     figure,
+    grade_word,
     group_note,
     group_title,
     kind_name,
@@ -16,6 +17,7 @@ from app.report.names import (
 from app.words import _
 from handstudio.analysis.change import Change
 from handstudio.analysis.measure import Kind, Measure
+from handstudio.analysis.sides import SideRatio, percent
 from handstudio.analysis.tables import Group, Row, grouped, judged, signed
 from handstudio.measure import Measured
 
@@ -38,26 +40,41 @@ class Table:
 def tables_of(measured: Measured) -> list[Table]:
     """Every measure, and what changed where there is an earlier visit."""
     known = {(change.kind, change.about): change for change in measured.changes}
-    return [_table(group, known) for group in grouped(measured.measures)]
+    sides = {(ratio.kind, ratio.about): ratio for ratio in measured.sides}
+    return [_table(group, known, sides) for group in grouped(measured.measures)]
 
 
-def _table(group: Group, known: dict[tuple[Kind, str], Change]) -> Table:
+def _table(
+    group: Group,
+    known: dict[tuple[Kind, str], Change],
+    sides: dict[tuple[Kind, str], SideRatio],
+) -> Table:
     kinds = _filled(group)
     compared = any(judged(row, known) for row in group.rows)
     normal = any(m.norm is not None for row in group.rows for m in row.cells.values())
     columns = [_("Joint or posture"), *(kind_name(kind) for kind in kinds)]
     columns += [_("Normal")] if normal else []
     columns += [_("Changed by")] if compared else []
+    ratios = [_ratios(row, sides) for row in group.rows]
+    columns += [_("Of the other hand")] if any(ratios) else []
     rows, marks = [], []
-    for row in group.rows:
+    for row, ratio in zip(group.rows, ratios, strict=True):
         changed = _changed(row, known)
         cells = [about_name(row.about) or "–", *_cells(row, kinds)]
         cells += [_normal(row)] if normal else []
         cells += [changed.words] if compared else []
+        cells += [ratio] if any(ratios) else []
         rows.append(tuple(cells))
         marks.append("changed" if changed.beyond else "short" if is_short(row) else "")
     title, note = group_title(group.name), group_note(group.name)
     return Table(title, note, tuple(columns), tuple(rows), tuple(marks))
+
+
+def _ratios(row: Row, sides: dict[tuple[Kind, str], SideRatio]) -> str:
+    """Shares of the other hand's; total active motion with its grade by that."""
+    found = [sides[kind, row.about] for kind in row.cells if (kind, row.about) in sides]
+    said = [f"{percent(ratio)} {grade_word(ratio.grade)}".strip() for ratio in found]
+    return ", ".join(said)
 
 
 def _filled(group: Group) -> list[Kind]:

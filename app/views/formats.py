@@ -20,6 +20,7 @@ def offered(layout: Layout) -> dict[str, Format]:
         "c3d": _("C3D (positions)"),
         "bvh": _("BVH (skeleton)"),
         "glb": _("GLB (animated 3-D)"),
+        "glb-skin": _("GLB with skin (animated 3-D)"),
         "mcap": _("MCAP (Foxglove, Rerun)"),
         "svg": _("SVG (plots of angles)"),
     }

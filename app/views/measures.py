@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 from pathlib import Path
 
 from app.report.names import about_name, grade_word, why_words
@@ -13,8 +14,10 @@ from app.views.pieces import AMBER, GREEN
 from app.words import _
 from handstudio.analysis.change import Change
 from handstudio.analysis.measure import Kind, Measure
+from handstudio.analysis.sides import SideRatio
 from handstudio.analysis.tables import Row, grouped, judged
 from handstudio.measure import Measured
+from handstudio.recording.header import Header
 
 
 def none_words() -> str:
@@ -24,20 +27,34 @@ def none_words() -> str:
 
 def earlier_takes(state: State) -> dict[str, Path]:
     """Takes of the hand of the open one that were recorded before it, newest first, by words."""
-    review = state.review
-    if review is None:
+    return _takes(
+        state,
+        lambda this, one: (
+            one.setup.layout.side == this.setup.layout.side and one.start_utc_ns < this.start_utc_ns
+        ),
+    )
+
+
+def other_hand(state: State) -> dict[str, Path]:
+    """Takes of the other hand of the person of the open one, newest first, by words."""
+    return _takes(
+        state,
+        lambda this, one: {one.setup.layout.side, this.setup.layout.side} == {"left", "right"},
+    )
+
+
+def _takes(state: State, wanted: Callable[[Header, Header], bool]) -> dict[str, Path]:
+    if state.review is None:
         return {}
-    header = review.take.header
+    this = state.review.take.header
     found = [
-        entry
+        (entry.take.header.start_utc_ns, f"{entry.visit} · {entry.name}", entry.path)
         for entry in state.shelf.takes
         if entry.take is not None
-        and entry.take.header.subject == header.subject
-        and entry.take.header.setup.layout.side == header.setup.layout.side
-        and entry.take.header.start_utc_ns < header.start_utc_ns
+        and entry.take.header.subject == this.subject
+        and wanted(this, entry.take.header)
     ]
-    found.sort(key=lambda entry: entry.take.header.start_utc_ns if entry.take else 0, reverse=True)
-    return {f"{entry.visit} · {entry.name}": entry.path for entry in found}
+    return {words: path for _at, words, path in sorted(found, reverse=True)}
 
 
 def short_html(review: Review) -> str:
@@ -52,8 +69,9 @@ def short_html(review: Review) -> str:
     if abs(visit.start_s - review.in_s) > _APART_S or abs(visit.end_s - review.end_s) > _APART_S:
         other = _("Another part counts now: measure again.")
         told.append(f'<div style="color:{AMBER}">{html.escape(other)}</div>')
+    sides = {(ratio.kind, ratio.about): ratio for ratio in measured.sides}
     rows = [
-        _line(row, known)
+        _line(row, known, sides)
         for group in grouped(measured.measures)
         if group.name in ("range", "scores", "opposition")
         for row in group.rows
@@ -73,7 +91,9 @@ _TABLE = "border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums"
 _CELL = "padding:.1em .5em .1em 0;vertical-align:top"
 
 
-def _line(row: Row, known: dict[tuple[Kind, str], Change]) -> str:
+def _line(
+    row: Row, known: dict[tuple[Kind, str], Change], sides: dict[tuple[Kind, str], SideRatio]
+) -> str:
     said, colour = _brief(row), AMBER if is_short(row) else ""
     beyond = [c for c in judged(row, known) if c.verdict in ("more", "less")]
     sign = ""
@@ -83,8 +103,17 @@ def _line(row: Row, known: dict[tuple[Kind, str], Change]) -> str:
     return (
         f'<tr style="{style}"><td style="{_CELL}">{html.escape(about_name(row.about))}</td>'
         f'<td style="{_CELL};white-space:nowrap">{html.escape(said)}</td>'
-        f'<td style="color:{GREEN}">{sign}</td></tr>'
+        f'<td style="color:{GREEN}">{sign}</td>{_of_other(row, sides)}</tr>'
     )
+
+
+def _of_other(row: Row, sides: dict[tuple[Kind, str], SideRatio]) -> str:
+    """The share of the other hand's, in brief: of a finger that of its total active motion."""
+    found = [sides[kind, row.about] for kind in row.cells if (kind, row.about) in sides]
+    title = html.escape(_("of the other hand"))
+    if not found:
+        return ""
+    return f'<td title="{title}" style="opacity:.75">{found[0].percent:.0f} %</td>'
 
 
 def _brief(row: Row) -> str:

@@ -14,6 +14,7 @@ from app.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lower
 from app.state import State
 from app.views.comparison import comparison_words
 from app.views.health import worst_of
+from app.views.timeline import rest_words
 from app.words import _, in_words
 from handstudio.arrays import Array
 from handstudio.device.health import HealthView
@@ -208,8 +209,9 @@ def caption_of(state: State) -> str:
         )
         smooth = _("smoothed") if review.setup.smooth else ""
         second = comparison_words(review.comparison) if review.comparison is not None else ""
-        part = _("the first seconds; the rest is being computed") if review.partial else ""
-        return " · ".join(filter(None, [what, part, smooth, second, _missing(review.setup)]))
+        return " · ".join(
+            filter(None, [what, rest_words(review), smooth, second, _missing(review.setup)])
+        )
     newest = state.newest
     if newest.setup is None or newest.motion is None:
         return _("No hand yet")

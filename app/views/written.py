@@ -14,7 +14,7 @@ from handstudio.analysis.take_grasps import TakenGrasp
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 
-_MARGIN_M = 0.008
+_MARGIN_M, _DESK_M = 0.008, 0.12
 _HEIGHT_PX = 90
 _INK_MM = 1.2
 
@@ -25,31 +25,30 @@ class TraceView:
 
     Attributes:
         writing: Whose.
-        page: Corners of the page that was written on.
+        desk: Corners of the plane that was written on, as far as a desk goes.
+        page: Corners of the page.
         lines: What is written by now, piece by piece.
         count: How many pieces that is: tells whether anything is new.
     """
 
     writing: Writing
+    desk: Float[Array, "4 3"]
     page: Float[Array, "4 3"]
     lines: Float[Array, "l 2 3"]
     count: int
 
 
 def trace_view(state: State) -> TraceView | None:
-    """The writing that is going on, or was last; None: there is none."""
+    """The writing that is going on, or was last, or is to come; None: there is none."""
     review = state.review
-    if review is None or review.found is None:
+    if review is None or review.found is None or not review.found.writings:
         return None
-    writing = review.found.writing_at(review.at_s)
-    if writing is None:
-        return None
+    writing = review.found.writing_at(review.at_s) or review.found.writings[0]
     both = writing.down[1:] & writing.down[:-1] & (writing.time_s[1:] <= review.at_s)
     points = writing.on_plane
     lines = np.stack([points[:-1][both], points[1:][both]], axis=1)
-    low, high = _box(writing)
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    return TraceView(writing, writing.origin + corners @ writing.axes, lines, len(lines))
+    desk, page = (_corners(writing, margin_m) for margin_m in (_DESK_M, _MARGIN_M))
+    return TraceView(writing, desk, page, lines, len(lines))
 
 
 def trace_picture(review: Review) -> str:
@@ -102,10 +101,18 @@ def grasp_names() -> dict[str, str]:
     }
 
 
-def _box(writing: Writing) -> tuple[Array, Array]:
-    """Of the page, with a margin."""
+def _corners(writing: Writing, margin_m: float) -> Array:
+    """Of the box around what is written, on its plane."""
+    low, high = _box(writing, margin_m)
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    on_plane: Array = writing.origin + corners @ writing.axes
+    return on_plane
+
+
+def _box(writing: Writing, margin_m: float = _MARGIN_M) -> tuple[Array, Array]:
+    """Of what is written, with a margin."""
     written = writing.flat[writing.down]
-    return written.min(axis=0) - _MARGIN_M, written.max(axis=0) + _MARGIN_M
+    return written.min(axis=0) - margin_m, written.max(axis=0) + margin_m
 
 
 def _path(flat: Array, low: Array, high: Array, opacity: float) -> str:

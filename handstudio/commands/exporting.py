@@ -25,7 +25,7 @@ from handstudio.setup import Setup, filter_named, smoothing
 from handstudio.shell import err, out, print_error, print_json, progress
 
 FormatName: TypeAlias = Literal[
-    "csv", "parquet", "mot", "sto", "trc", "c3d", "bvh", "glb", "mcap", "svg"
+    "csv", "parquet", "mot", "sto", "trc", "c3d", "bvh", "glb", "glb-skin", "mcap", "svg"
 ]
 TableContent: TypeAlias = Literal["angles", "orientations", "segments", "positions"]
 

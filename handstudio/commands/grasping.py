@@ -7,12 +7,9 @@ from typing import Any
 from handstudio.analysis.take_grasps import TakenGrasp, grasps_in
 from handstudio.analysis.take_writing import can_tell_writing, writings_in
 from handstudio.commands.arguments import Json, TakeFile
-from handstudio.commands.calibration import chosen
+from handstudio.commands.preparing import prepared
 from handstudio.export.part import Window, cut
-from handstudio.process import aligned_setup
-from handstudio.process import process as process_take
-from handstudio.recording.take import open_take
-from handstudio.shell import out, print_json, print_table, progress
+from handstudio.shell import out, print_json, print_table
 
 
 def grasps(
@@ -36,12 +33,8 @@ def grasps(
         align: Align the headings by the take's own quick start.
         json: Print JSON for a program instead of words.
     """
-    opened = open_take(take)
-    setup = chosen(opened.header.setup, calibration, sensors)
-    if align:
-        setup, _ = aligned_setup(opened, setup)
-    with progress(take.name, quiet=json) as share:
-        motion = process_take(opened, setup, progress=share)
+    ready = prepared(take, calibration, sensors, align=align, quiet=json)
+    setup, motion = ready.setup, ready.motion
     part, begin_us = cut(motion, Window(start_s, end_s)), int(motion.time_us[0])
     writings = writings_in(setup, part, begin_us) if can_tell_writing(setup.layout) else []
     found = grasps_in(setup, part, begin_us, writings=writings)

@@ -9,6 +9,7 @@ import msgspec
 from handstudio.analysis.change import Change
 from handstudio.analysis.measure import Kind, Measure
 from handstudio.analysis.posture_time import DEFAULT_BANDS
+from handstudio.analysis.sides import SideRatio, percent
 from handstudio.analysis.tables import Group, GroupName, Row, grouped, judged, signed, written
 from handstudio.commands import calibration as calibration_commands
 from handstudio.commands.arguments import Json, TakeFile
@@ -73,6 +74,7 @@ def measure(
     take: TakeFile,
     *,
     earlier: Path | None = None,
+    other_side: Path | None = None,
     start_s: float = 0.0,
     end_s: float | None = None,
     posture: tuple[str, ...] = (),
@@ -87,6 +89,7 @@ def measure(
     Args:
         take: The take.
         earlier: A take of an earlier visit of the same hand, to compare with.
+        other_side: A take of the other hand of the same person: ranges and scores as shares of its.
         start_s: Begin of the part, seconds from the take's first instant.
         end_s: End of the part; the end of the take unless given.
         posture: Postures whose time is counted instead of the usual, as NAME=ANGLE:FROM:TO [deg];
@@ -108,6 +111,7 @@ def measure(
             setup,
             Window(start_s, end_s),
             earlier=None if earlier is None else open_take(earlier),
+            other_side=None if other_side is None else open_take(other_side),
             bands=bands,
             progress=share,
         )
@@ -130,23 +134,33 @@ def show(found: Measured) -> None:
     out.print(f"calibration: {visit.calibration}; zero: {visit.zero}; filter: {visit.filter}")
     if found.earlier is not None:
         out.print(f"compared with {found.earlier.take} of {found.earlier.visit}")
+    if found.other_side is not None:
+        out.print(f"the other hand: {found.other_side.take} of {found.other_side.visit}")
     out.print("± one standard uncertainty; docs/measures.md says what each measure is\n")
     known = {(change.kind, change.about): change for change in found.changes}
+    sides = {(ratio.kind, ratio.about): ratio for ratio in found.sides}
     for group in grouped(found.measures):
-        _show(group, known)
+        _show(group, known, sides)
 
 
-def _show(group: Group, known: dict[tuple[Kind, str], Change]) -> None:
+def _show(
+    group: Group,
+    known: dict[tuple[Kind, str], Change],
+    sides: dict[tuple[Kind, str], SideRatio],
+) -> None:
     compared = any(judged(row, known) for row in group.rows)
     normal = any(m.norm is not None for row in group.rows for m in row.cells.values())
     columns = ["", *(_COLUMNS[kind] for kind in group.kinds)]
     columns += ["normal"] if normal else []
     columns += ["change"] if compared else []
+    ratios = [_ratios(row, sides) for row in group.rows]
+    columns += ["of the other hand"] if any(ratios) else []
     rows = []
-    for row in group.rows:
+    for row, ratio in zip(group.rows, ratios, strict=True):
         cells = [row.about, *(_cell(row, kind) for kind in group.kinds)]
         cells += [_normal(row)] if normal else []
         cells += [_changed(row, known)] if compared else []
+        cells += [ratio] if any(ratios) else []
         rows.append(cells)
     print_table(_TITLES[group.name], columns, rows)
     out.print("")
@@ -177,6 +191,11 @@ def _changed(row: Row, known: dict[tuple[Kind, str], Change]) -> str:
     if beyond:
         return ", ".join(f"{_COLUMNS[change.kind]} {signed(change)}" for change in beyond)
     return "no detectable change" if found else ""
+
+
+def _ratios(row: Row, sides: dict[tuple[Kind, str], SideRatio]) -> str:
+    found = [sides[kind, row.about] for kind in row.cells if (kind, row.about) in sides]
+    return ", ".join(f"{percent(ratio)} {ratio.grade}".strip() for ratio in found)
 
 
 def _write(path: Path, found: Measured) -> None:

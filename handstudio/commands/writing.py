@@ -8,17 +8,15 @@ from typing import Any
 from handstudio.analysis.take_writing import writings_in
 from handstudio.analysis.writing import Writing
 from handstudio.commands.arguments import Json, TakeFile
-from handstudio.commands.calibration import chosen
+from handstudio.commands.preparing import prepared
 from handstudio.errors import TakeError
 from handstudio.export.metadata import of_part, of_take
 from handstudio.export.part import Window, cut
 from handstudio.export.trace import FORMATS, csv_sidecar, save, told
 from handstudio.pipeline import Motion
-from handstudio.process import aligned_setup
-from handstudio.process import process as process_take
-from handstudio.recording.take import Take, open_take
+from handstudio.recording.take import Take
 from handstudio.setup import Setup
-from handstudio.shell import out, print_json, print_table, progress
+from handstudio.shell import out, print_json, print_table
 
 
 def trace(
@@ -50,12 +48,8 @@ def trace(
         align: Align the headings by the take's own quick start.
         json: Print JSON for a program instead of words.
     """
-    opened = open_take(take)
-    setup = chosen(opened.header.setup, calibration, sensors)
-    if align:
-        setup, _ = aligned_setup(opened, setup)
-    with progress(take.name, quiet=json) as share:
-        motion = process_take(opened, setup, progress=share)
+    ready = prepared(take, calibration, sensors, align=align, quiet=json)
+    opened, setup, motion = ready.take, ready.setup, ready.motion
     part = cut(motion, Window(start_s, end_s))
     found = writings_in(setup, part, int(motion.time_us[0]))
     if not found:

@@ -20,7 +20,7 @@ class Format:
     """How a motion becomes a file.
 
     Attributes:
-        name: What a person calls it, which is also what the file's name ends in.
+        name: What a person calls it, which is also what the file's name ends in but for ``ending``.
         contents: What of a motion it can hold; the first where a person does not say.
         write: Writes the whole file.
         axes: The world of the file; empty: it holds none.
@@ -110,6 +110,14 @@ FORMATS: dict[str, Format] = {
             fills_gaps=True,
         ),
         Format("glb", ("skeleton",), glb.write, axes=f"{_Y_UP}; metres", fills_gaps=True),
+        Format(
+            "glb-skin",
+            ("skeleton",),
+            glb.write_skin,
+            axes=f"{_Y_UP}; metres",
+            fills_gaps=True,
+            ending=".skin.glb",
+        ),
         Format(
             "mcap", ("motion",), mcap.write, axes=f"{_OURS}; metres", ending=VIEW, more=mcap.places
         ),

@@ -1,8 +1,7 @@
 """Animated GLB: a node a segment that turns in its parent, y up, metres, quaternions x, y, z, w.
 
 Time begins at the window's first instant. The pose is held over gaps, where a viewer would else
-glide. A skinned mesh would be one more node beside the root with ``skin``: its joints are the
-nodes of the segments, `NODES`, whose attitudes without animation are those of the flat hand.
+glide. Either every node has a bone to see, or one more node has the skin (`glb_skin`).
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import numpy as np
 
 from handstudio.arrays import Array
 from handstudio.colours import of_part
+from handstudio.export import glb_skin
 from handstudio.export.bones import CHILDREN, ends, in_parents
 from handstudio.export.gltf import Document
 from handstudio.export.part import BLOCK, Part, seconds
@@ -29,7 +29,12 @@ _THICK = 0.12  # of a drawn bone, as a share of its length
 _THICKEST_M = 0.008
 
 
-def write(part: Part, file: BinaryIO) -> None:
+def write_skin(part: Part, file: BinaryIO) -> None:
+    """Write the skin of the hand and the animated skeleton that carries it."""
+    write(part, file, skin=True)
+
+
+def write(part: Part, file: BinaryIO, *, skin: bool = False) -> None:
     """Write skeleton and animation."""
     fit = fit_of(part.setup)
     document = Document(
@@ -44,7 +49,10 @@ def write(part: Part, file: BinaryIO) -> None:
             "nodes": _nodes(fit.skeleton),
         }
     )
-    _draw(document, fit.skeleton)
+    if skin:
+        glb_skin.draw(document, fit.skeleton, NODES)
+    else:
+        _draw(document, fit.skeleton)
     which, time_s = _keys(part)
     outputs = _animate(document, time_s)
     first = document.begin(file)
@@ -71,7 +79,6 @@ def _nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
             "name": name,
             "translation": offsets[index].tolist(),
             "rotation": rest[index].tolist(),
-            "mesh": index,
         }
         nodes.append(node | ({"children": list(CHILDREN[index])} if CHILDREN[index] else {}))
     for index in NODES:
@@ -87,6 +94,7 @@ def _draw(document: Document, skeleton: Skeleton) -> None:
     """A mesh a segment: spindles to the joints it carries, or to its tip."""
     meshes, materials = [], []
     for index, name in enumerate(SEGMENTS):
+        document.about["nodes"][index]["mesh"] = index
         spindles = [_spindle(end) for end in ends(skeleton, index)]
         corners = np.concatenate(spindles)
         faces = np.concatenate([_FACES + 6 * k for k in range(len(spindles))])

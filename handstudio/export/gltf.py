@@ -17,7 +17,7 @@ from handstudio.arrays import Array
 FLOAT, INDEX = 5126, 5123
 """Kinds of component: 32-bit float, 16-bit index."""
 
-_SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+_SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
 
@@ -36,7 +36,7 @@ class Document:
     size: int = 0
 
     def add(self, values: Array) -> int:
-        """Take in an array, (n,) or (n, 3 or 4), floats or indices; returns its accessor."""
+        """Take in an array, (n,) or (n, 3, 4 or 16), floats or indices; returns its accessor."""
         kind = INDEX if values.dtype.kind == "u" else FLOAT
         data = np.ascontiguousarray(values, dtype="<u2" if kind == INDEX else "<f4")
         wide = 1 if data.ndim == 1 else data.shape[1]

@@ -7,14 +7,25 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from io import SEEK_END
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import msgspec
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
-from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Message, Metadata
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    Chunk,
+    DataEnd,
+    Footer,
+    McapRecord,
+    Message,
+    Metadata,
+    MetadataIndex,
+    SummaryOffset,
+)
 from mcap.records import Header as McapHeader
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
@@ -64,6 +75,9 @@ def pack_first_state(state: FirstState) -> bytes:
     """The attachment that holds a first state."""
     return msgspec.msgpack.encode(_PackedFirstState(state.stream, state.pipeline))
 
+
+_FOOTER = 1 + 8 + 20 + 8
+"""Bytes of the last record, with its kind and length, and of the mark that every file ends with."""
 
 _CHUNKS = 32
 """Decoded at a time: a few make short runs of instants, and these cost more each."""
@@ -185,14 +199,41 @@ def _summary(path: Path) -> Summary | None:
     """The closing record, found through the file's index; fails where the file has no end."""
     try:
         with path.open("rb") as stream:
-            reader = make_reader(stream)
-            reader.get_summary()
-            for record in reader.iter_metadata():
-                if record.name == SUMMARY_RECORD:
+            for index in _metadata_indexes(stream):
+                if index.name == SUMMARY_RECORD:
+                    stream.seek(index.offset)
+                    record = next(StreamReader(stream, skip_magic=True).records)
+                    if not isinstance(record, Metadata):
+                        raise McapError("the index of the closing record points elsewhere")
                     return decode_summary(record.metadata)
     except (OSError, *DAMAGE) as error:  # OSError: an index that points nowhere
         raise _damaged(path, error) from error
     return None
+
+
+def _metadata_indexes(stream: BinaryIO) -> Iterator[MetadataIndex]:
+    """Where the metadata of a closed file lies; the index of chunks, as long as the take, is left.
+
+    A reader that decodes all of the index needs seconds for an hour's.
+    """
+    stream.seek(-_FOOTER, SEEK_END)
+    footer = next(StreamReader(stream, skip_magic=True).records)
+    if not isinstance(footer, Footer):
+        raise McapError("the file has no end")
+    start = footer.summary_start
+    if start == 0:
+        return
+    if footer.summary_offset_start:
+        stream.seek(footer.summary_offset_start)
+        offsets = StreamReader(stream, skip_magic=True).records
+        groups = {g.group_opcode: g for g in offsets if isinstance(g, SummaryOffset)}
+        if Opcode.METADATA_INDEX not in groups:
+            return
+        start = groups[Opcode.METADATA_INDEX].group_start
+    stream.seek(start)
+    for record in StreamReader(stream, skip_magic=True, record_size_limit=RECORD_LIMIT).records:
+        if isinstance(record, MetadataIndex):
+            yield record
 
 
 def unpack_first_state(data: bytes) -> FirstState:

@@ -93,9 +93,10 @@ def around(radius_m: float, flesh_m: float, seed: int) -> Bones:
 @pytest.mark.parametrize("radius_m", [0.02, 0.0375, 0.045])
 def test_a_sphere_is_as_large_as_the_bones_around_it_say(radius_m):
     for seed in range(5):
-        found, left = sphere_held(around(radius_m, 0.007, seed))
-        assert found == pytest.approx(radius_m, abs=1e-5)
-        assert left < 1e-5
+        found = sphere_held(around(radius_m, 0.007, seed))
+        assert found.radius_m == pytest.approx(radius_m, abs=1e-5)
+        assert found.residual_m < 1e-5
+        np.testing.assert_allclose(found.middle, [0.01, 0.09, -0.06], atol=1e-5)
 
 
 def test_a_bar_across_the_palm_is_as_thick_as_the_fingers_around_it_say():
@@ -105,9 +106,13 @@ def test_a_bar_across_the_palm_is_as_thick_as_the_fingers_around_it_say():
     round_it = np.stack([np.zeros(6), -np.sin(angle), np.cos(angle)], axis=-1)
     middle = (radius + flesh) * out + np.stack([x, np.full(6, 0.08), np.full(6, -0.05)], axis=-1)
     bones = Bones(middle - 0.01 * round_it, middle + 0.01 * round_it, np.full(6, flesh))
-    found, left = cylinder_held(bones)
-    assert found == pytest.approx(radius, abs=2e-4)
-    assert left < 2e-4
+    found = cylinder_held(bones)
+    assert found.radius_m == pytest.approx(radius, abs=2e-4)
+    assert found.residual_m < 2e-4
+    np.testing.assert_allclose(found.middle[1:], [0.08, -0.05], atol=5e-4)
+    assert found.axis[0] > 0.999
+    again = cylinder_held(bones, found.solution)
+    assert again.radius_m == pytest.approx(found.radius_m, abs=1e-6)
 
 
 def test_a_size_is_told_only_where_enough_touches_and_not_of_a_flat_hand():

@@ -108,7 +108,6 @@ def test_a_take_is_measured_and_reported_on_the_page(
     page = visit(start_studio(sessions=sessions), 1440, 900)
     page.get_by_role("tab", name="Review").click()
     choose(page, "^one · ")
-    page.get_by_text("Measures", exact=True).first.click()
     button(page, "Measure this part").click()
     expect(page.get_by_text("Index PIP flexion")).to_be_visible()
     button(page, "All measures").click()

@@ -15,10 +15,15 @@ import pybvh
 import pygltflib
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from handstudio.export.part import Processed
 from handstudio.export.tables import POINTS
+from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import FINGERS, SEGMENTS
+from handstudio.hand_fit import fit_of
+from handstudio.hand_surface import skinned
+from handstudio.kinematics import pose_of
 from handstudio.pipeline import join
 from handstudio.setup import divided
 
@@ -178,9 +183,10 @@ def test_in_a_gap_bvh_holds_the_pose_before(into, gappy, points):
 def accessor(gltf: pygltflib.GLTF2, index: int) -> np.ndarray:
     one = gltf.accessors[index]
     view = gltf.bufferViews[one.bufferView]
-    wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[one.type]
+    wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[one.type]
     begin = (view.byteOffset or 0) + (one.byteOffset or 0)
-    data = np.frombuffer(gltf.binary_blob(), "<f4", one.count * wide, begin)
+    kind = {pygltflib.FLOAT: "<f4", pygltflib.UNSIGNED_SHORT: "<u2"}[one.componentType]
+    data = np.frombuffer(gltf.binary_blob(), kind, one.count * wide, begin)
     return data.reshape(one.count, wide).astype(float)
 
 
@@ -205,7 +211,7 @@ def glb_points(path: Path) -> tuple[pygltflib.GLTF2, np.ndarray, np.ndarray]:
             walk(child, q, place)
 
     count = len(time_s)
-    (root,) = gltf.scenes[gltf.scene].nodes
+    root = gltf.scenes[gltf.scene].nodes[0]
     walk(root, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), np.zeros((count, 3)))
     names = [*SEGMENTS, *(p for p in POINTS if p.endswith("_tip"))]
     return gltf, time_s, z_up(np.stack([found[name] for name in names], axis=1)) * 1e3
@@ -259,6 +265,67 @@ def test_another_viewer_shows_the_flat_hand_of_glb(into, whole):
     assert -low[2] == pytest.approx(length * (1.352 + 0.99), abs=0.02)
     assert (high - low)[1] < 0.06
     assert high[0] > -low[0] * 0.5, "the thumb of a left hand lies towards +x"
+
+
+# --- GLB with skin --------------------------------------------------------------------------------
+
+
+def matrices(gltf: pygltflib.GLTF2, key: int) -> np.ndarray:
+    """Of every joint of the skin at a key of the animation: from its frame to the world."""
+    (animation,), (skin,) = gltf.animations, gltf.skins
+    turns = {
+        channel.target.node: accessor(gltf, animation.samplers[channel.sampler].output)[key]
+        for channel in animation.channels
+    }
+    found = {}
+
+    def walk(node: int, above: np.ndarray) -> None:
+        here, local = gltf.nodes[node], np.eye(4)
+        q = turns.get(node, np.array(here.rotation or [0.0, 0.0, 0.0, 1.0]))
+        local[:3, :3] = Rotation.from_quat(q).as_matrix()
+        local[:3, 3] = here.translation or [0.0, 0.0, 0.0]
+        found[node] = above @ local
+        for child in here.children or []:
+            walk(child, found[node])
+
+    walk(gltf.scenes[gltf.scene].nodes[0], np.eye(4))
+    return np.stack([found[node] for node in skin.joints])
+
+
+@pytest.mark.parametrize("hand_type", [2, 3])
+def test_the_skin_of_glb_goes_where_the_hand_goes(into, whole, hand_type):
+    source = Processed(whole.take, divided(whole.setup, hand_type), whole.motion)
+    path = into("glb-skin", source).rename(into.folder / "skin.glb")
+    gltf, time_s, found = glb_points(path)
+    trc = read_trc(into("trc", source))[2]
+    np.testing.assert_allclose(found, trc, atol=0.1)
+    (primitive,) = gltf.meshes[0].primitives
+    held, parts = primitive.attributes, {}
+    for name in ("POSITION", "NORMAL", "JOINTS_0", "WEIGHTS_0"):
+        parts[name] = accessor(gltf, getattr(held, name))
+    joints, weights = parts["JOINTS_0"].astype(int), parts["WEIGHTS_0"]
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(parts["NORMAL"], axis=1), 1.0, atol=1e-5)
+    assert (joints[weights == 0.0] == 0).all()
+    inverse = accessor(gltf, gltf.skins[0].inverseBindMatrices).reshape(-1, 4, 4).swapaxes(1, 2)
+    fit = fit_of(source.setup)
+    surface = skinned(fit.skeleton)
+    points = np.concatenate([parts["POSITION"], np.ones((len(joints), 1))], axis=1)
+    for key in (0, 150, len(time_s) - 1):
+        carried = (matrices(gltf, key) @ inverse)[joints]
+        moved = np.einsum("vs,vsij,vj->vi", weights, carried, points)[:, :3]
+        pose = pose_of(source.setup, whole.motion.q_world_sensor[key : key + 1], fit)
+        single = Pose(pose.q_world_segment[0], pose.t_world_joint[0], pose.t_world_tip[0])
+        np.testing.assert_allclose(1e3 * z_up(moved), 1e3 * surface.moved(single), atol=0.1)
+
+
+def test_another_viewer_shows_the_skin_of_glb_closed_and_outside_out(into, whole):
+    path = into("glb-skin", whole).rename(into.folder / "skin.glb")
+    (mesh,) = trimesh.load(path).geometry.values()
+    mesh.merge_vertices()
+    assert mesh.is_watertight
+    assert mesh.volume > 1e-4  # inside out it would be negative
+    assert mesh.extents.max() == pytest.approx(0.175 * (1.352 + 0.99), abs=0.06)
 
 
 # --- all of them ----------------------------------------------------------------------------------

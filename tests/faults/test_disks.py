@@ -45,18 +45,6 @@ def failed(studio) -> HandstudioError:
 
 
 @contextmanager
-def limit_of_file_size(size: int) -> Iterator[None]:
-    import resource  # noqa: PLC0415 - not on Windows
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
-@contextmanager
 def small_disk(place: Path, size: str) -> Iterator[None]:
     place.mkdir()
     mounted = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
@@ -70,7 +58,9 @@ def small_disk(place: Path, size: str) -> Iterator[None]:
         subprocess.run(["umount", "-l", str(place)], check=True)
 
 
-def test_a_file_that_may_grow_no_more_ends_the_take_not_the_stream(studio, glove):
+def test_a_file_that_may_grow_no_more_ends_the_take_not_the_stream(
+    studio, glove, limit_of_file_size
+):
     studio.connect(glove(seed=71, rate=200).address)
     with limit_of_file_size(150_000):
         path = studio.start_take()
@@ -101,7 +91,9 @@ def test_a_full_disk_ends_the_take_not_the_stream(studio, glove, tmp_path):
     check_recovered(studio, tmp_path / "take.mcap", 100)
 
 
-def test_a_full_disk_for_the_motion_alone_costs_the_take_nothing(studio, glove, monkeypatch):
+def test_a_full_disk_for_the_motion_alone_costs_the_take_nothing(
+    studio, glove, monkeypatch, limit_of_file_size
+):
     """At 20 sensors a motion is twice as large as the bytes it is made of."""
     studio.connect(glove(seed=73, rate=200).address)
     with limit_of_file_size(200_000):

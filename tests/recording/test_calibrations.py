@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -298,20 +297,8 @@ def test_a_device_without_a_number_or_a_day_is_refused(tmp_path):
 # --- full disks -----------------------------------------------------------------------------------
 
 
-@contextmanager
-def limit_of_file_size(size: int) -> Iterator[None]:
-    import resource  # noqa: PLC0415 - not on Windows
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 @posix
-def test_a_disk_that_is_full_leaves_the_one_before(store, content):
+def test_a_disk_that_is_full_leaves_the_one_before(store, content, limit_of_file_size):
     made = store.save(1)
     before = content(store.sessions)
     with (

@@ -53,6 +53,21 @@ def test_two_visits_are_compared(here, tmp_path):
     assert here("measure", first, "--earlier", second).code == 1
 
 
+def test_the_other_hand_is_compared_with(here, tmp_path):
+    right, left = (
+        simulate(tmp_path, rehearse(seed=1, side=s), seconds=4.0, code="S", name=s)
+        for s in ("right", "left")
+    )
+    said = here("measure", right, "--other-side", left)
+    assert said.code == 0, said.err
+    assert "of the other hand" in said.out
+    assert "the other hand: left" in said.out
+    report = tmp_path / "r.html"
+    assert here("report", right, "--other-side", left, "--to", report, "--end-s", "3").code == 0
+    assert "Of the other hand" in report.read_text(encoding="utf-8")
+    assert here("measure", right, "--other-side", right).code == 1
+
+
 def test_a_report_is_written_beside_the_take(here, take):
     said = here("report", take, "--language", "ja", "--end-s", "3")
     assert said.code == 0, said.err

@@ -13,7 +13,7 @@ import pytest
 from app import intents
 from app import review as reviewing
 from app.found import Found, found_in
-from app.jobs import Jobs
+from app.jobs import Beside, Jobs
 from app.report.make import report_of, report_path, save_report
 from app.review import Review
 from app.state import State
@@ -114,21 +114,23 @@ class PromptJobs:
         return done(lambda: export(source, target, chosen, content=content, window=window))
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None
+        self, path: Path, window: Window, setup: Setup | None, beside: Beside
     ) -> Future[Measured]:
-        before = None if earlier is None else open_take(earlier)
-        return done(lambda: measure(open_take(path), setup, window, earlier=before))
+        return done(lambda: measure(open_take(path), setup, window, **_opened(beside)))
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, earlier: Path | None, language: str
+        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
     ) -> Future[Path]:
-        before = None if earlier is None else open_take(earlier)
-
         def work() -> Path:
-            made = report_of(open_take(path), setup, window, earlier=before, language=language)
+            made = report_of(open_take(path), setup, window, language=language, **_opened(beside))
             return save_report(made.html, report_path(path, language))
 
         return done(work)
+
+
+def _opened(beside: Beside) -> dict[str, Any]:
+    earlier, other = (None if one is None else open_take(one) for one in beside)
+    return {"earlier": earlier, "other_side": other}
 
 
 def done(work: Callable[[], Any]) -> Future[Any]:

@@ -71,7 +71,7 @@ def test_words_marks_and_stretches_are_kept_and_taken_back(studio: Studio, taken
     assert [(n.start_s, n.end_s, n.label) for n in state.review.notes.labels] == [
         (1.0, 2.0, "pinch")
     ]
-    strip = timeline.as_svg(state.review)
+    strip = timeline.as_html(state.review)
     assert "pinch 1.00-2.00 s" in strip
     state = after(studio, intents.Undo(), intents.Undo())
     assert state.review is not None

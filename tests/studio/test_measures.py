@@ -61,6 +61,22 @@ def test_an_earlier_take_of_the_hand_can_be_compared_with(opened: Studio) -> Non
     assert reviewed(after(opened, intents.CompareVisits(None))).measured is None
 
 
+def test_the_other_hand_can_be_compared_with(opened: Studio) -> None:
+    assert view.other_hand(opened.state) == {}
+    code = reviewed(opened.state).take.header.subject
+    left = rehearse(seed=4, side="left")
+    path = simulate(opened.state.sessions, left, seconds=4.0, code=code, name="left")
+    opened.refresh_takes()
+    (words,) = view.other_hand(opened.state)
+    assert view.other_hand(opened.state)[words] == path
+    after(opened, intents.CompareSides(path), intents.MeasureHand())
+    review = reviewed(opened.tick(0.1))
+    assert review.measured is not None
+    assert "Of the other hand" in view.full_html(review.measured)
+    assert "of the other hand" in view.short_html(review)
+    assert reviewed(after(opened, intents.CompareSides(None))).measured is None
+
+
 def test_a_report_comes_to_the_page_that_asked(opened: Studio) -> None:
     (download,) = after(opened, intents.MakeReport(7)).downloads
     assert download.page == 7

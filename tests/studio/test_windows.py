@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,15 +15,26 @@ from app import intents
 from app import review as reviewing
 from app.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
 from app.comparison import OF_TAKE
+from app.found import Found
+from app.jobs import Stopped
 from app.review import Review
+from app.review import opened as opened_review
 from app.state import State
 from app.studio import Studio
-from app.views import timeline
+from app.views import lane, timeline
 from app.views.page import caption_of, curves_of
+from handstudio.analysis.grasps import GraspSegment, Recognised
+from handstudio.analysis.pen_tip import Plane
 from handstudio.analysis.stretches import Stretch
-from handstudio.process import kept_motion, process
+from handstudio.analysis.take_grasps import TakenGrasp
+from handstudio.analysis.writing import Writing
+from handstudio.arrays import Array
+from handstudio.errors import HandstudioError
+from handstudio.process import kept_motion, process, process_head
+from handstudio.recording.notes import with_mark
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
+from handstudio.setup import Setup
 
 from .conftest import TICK_S, StillCapture, after
 
@@ -205,6 +217,104 @@ def test_the_first_seconds_are_there_before_the_rest(
     assert (review.at_s, len(review.motion)) == (1.5, len(motion))
 
 
+def test_a_rest_that_was_cancelled_is_no_longer_promised_and_can_be_had(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take, jobs = open_take(path), studio._workshop.jobs
+    running: list[Future[None]] = []
+
+    def wait(_path: Path, _setup: Setup | None = None) -> Future[None]:
+        running.append(Future())
+        return running[-1]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(jobs, "process", wait)
+        state = until(studio, intents.OpenTake(path), lambda state: state.review is not None)
+        assert "is being computed" in caption_of(state)
+        running[0].set_exception(Stopped("It was stopped.", "Nothing was changed."))
+        state = until(studio, intents.Seek(0.5), lambda state: state.work is None)
+        assert state.review is not None
+        assert state.review.rest == "missing"
+        assert "is not computed" in caption_of(state)
+        assert "is not computed" in timeline.as_html(state.review)
+        assert "is being computed" in caption_of(after(studio, intents.ComputeRest()))
+        running[1].set_exception(HandstudioError("The job was killed.", "Try again."))
+        state = studio.tick(TICK_S)
+        assert state.messages[0].alarm
+        assert "is not computed" in caption_of(state)
+    state = until(studio, intents.ComputeRest(), lambda state: state.work is None)
+    assert state.review is not None
+    assert state.review.rest == "here"
+    assert (state.review.at_s, len(state.review.motion)) == (0.5, len(process(take)))
+
+
+def test_an_export_brings_the_rest_as_well(studio: Studio, path: Path) -> None:
+    take = open_take(path)
+    part = opened_review(take, process_head(take, 2.0))
+    studio.state = replace(studio.state, review=replace(part, rest="missing"))
+    state = until(
+        studio, intents.Export(None, 1, "csv"), lambda state: state.review and not state.work
+    )
+    assert state.review is not None
+    assert state.review.rest == "here"
+
+
+def test_what_was_stopped_is_not_said_to_be_looked_through(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopped: Future[None] = Future()
+    stopped.set_exception(Stopped("It was stopped.", "Nothing was changed."))
+    monkeypatch.setattr(studio._workshop.jobs, "survey", lambda *_asked: stopped)
+    assert "not looked through" in timeline.as_html(opened(studio, path))
+
+
+def grasp(name: str, hold_s: float, release_s: float) -> TakenGrasp:
+    known = Recognised(name, "", 0.97, 0.4, "tripod")
+    segment = GraspSegment(known, hold_s - 0.3, hold_s, release_s, release_s + 0.3)
+    return TakenGrasp(segment, None)
+
+
+def wrote(time_s: Array, down: Array) -> Writing:
+    flat = np.linspace([0.0, 0.0], [0.03, 0.0], len(time_s))
+    plane = Plane(np.array([0.0, 0.0, 1.0]), -0.05)
+    tip = np.concatenate([flat, np.full((len(flat), 1), -0.05)], axis=1)
+    axes, origin = np.eye(3)[:2], np.array([0.0, 0.0, -0.05])
+    return Writing(time_s, tip, tip, down, plane, axes, flat, origin, 0.0, 0.0, np.zeros(3))
+
+
+def test_the_lane_names_grasps_and_writing_of_the_time_in_the_plots(review: Review) -> None:
+    time_s = np.linspace(5.0, 7.0, 41)
+    down = (time_s < 5.6) | (time_s > 6.4)
+    held = (grasp("power_sphere", 1.0, 2.0), grasp("tripod", 3.0, 3.5))
+    full = replace(review, found=Found((wrote(time_s, down),), held))
+    strip = timeline.as_html(full)
+    assert ">Power sphere 97 %</span>" in strip
+    assert ">Tripod 97 %</span>" in strip
+    assert ">writing</span>" in strip
+    assert strip.count(lane.INK) == 4  # all of it and two strokes, and its name
+    part = reviewing.marked_out(
+        reviewing.sought(reviewing.marked_in(reviewing.sought(full, 2.5)), 4.5)
+    )
+    near = timeline.as_html(reviewing.fitted(part))
+    assert ">Tripod 97 %</span>" in near
+    assert ">Power sphere 97 %</span>" not in near
+    assert "span" not in lane.as_html(replace(full, from_s=7.5, to_s=8.0))
+    assert lane.as_html(replace(review, found=Found())) == ""
+
+
+def test_the_strip_is_made_anew_only_where_more_is_known_of_the_take(review: Review) -> None:
+    later = reviewing.sought(review, 3.0)
+    for moved in (later, reviewing.zoomed(review, 2.0), reviewing.marked_in(later)):
+        assert timeline.drawn_from(moved) == timeline.drawn_from(review)
+        assert timeline.strip(moved) == timeline.strip(review)
+        assert timeline.overlay(moved) != timeline.overlay(review)
+    noted = replace(review, notes=with_mark(review.notes, 3.0, "here"))
+    found = replace(review, found=Found((), (grasp("tripod", 3.0, 3.5),)))
+    for other in (noted, found):
+        assert timeline.drawn_from(other) != timeline.drawn_from(review)
+        assert timeline.strip(other) != timeline.strip(review)
+
+
 def test_the_strip_tells_what_to_look_at_twice(studio: Studio, path: Path) -> None:
     review = opened(studio, path)
     assert review.stretches is not None
@@ -212,11 +322,12 @@ def test_the_strip_tells_what_to_look_at_twice(studio: Studio, path: Path) -> No
         Stretch("gap", 1.0, 1.2, (), 20.0),
         Stretch("impossible", 2.0, 2.5, ("index_dip_flexion",), 31.0),
     )
-    strip = timeline.as_svg(replace(review, stretches=found))
+    strip = timeline.as_html(replace(review, stretches=found))
     assert "gap 20 instants missing · 1.00-1.20 s" in strip
     assert "hardly possible index_dip_flexion 31° beyond" in strip
-    assert "nothing to look at twice" in timeline.as_svg(replace(review, stretches=()))
-    assert "looking through" in timeline.as_svg(replace(review, stretches=None))
+    assert "nothing to look at twice" in timeline.as_html(replace(review, stretches=()))
+    on = replace(review, stretches=None, ordered=frozenset(["stretches"]))
+    assert "looking through" in timeline.as_html(on)
 
 
 def test_a_take_is_looked_through_once(
