@@ -8,11 +8,13 @@ import viser
 from app import colours
 from app.boards import BOARD_M, Boards, boards_of
 from app.bones import BoneSet, bone_sets, hand_length, joint_radii
+from app.halo import HaloNodes
 from app.ink import InkNodes
 from app.look import DESK_TARGET, Camera
 from app.meshes import mesh
 from app.skin import SkinNodes
 from app.views.course import GhostView
+from app.views.joint import HaloView
 from app.views.page import HandView, SensorsView
 from app.views.written import TraceView
 from handstudio.arrays import Array
@@ -45,6 +47,7 @@ class Scene:
         self._skin = SkinNodes(server, "/hand/skin")
         self._ghost = _GhostNodes(server)
         self._ink = InkNodes(server)
+        self._halo = HaloNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
         self._dark: bool | None = None
@@ -75,6 +78,10 @@ class Scene:
     def render_trace(self, view: TraceView | None) -> None:
         """Show what is written by now, or nothing."""
         self._ink.render(view)
+
+    def render_halo(self, view: HaloView | None) -> None:
+        """Show how well a joint was found, or nothing."""
+        self._halo.render(view)
 
     def say(self, words: str) -> None:
         """Words in the middle of the picture; none: nothing."""

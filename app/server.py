@@ -19,6 +19,7 @@ from app.state import Download, Message, State
 from app.studio import Studio
 from app.views.comparison import compared_ghost
 from app.views.course import ghost_view
+from app.views.joint import halo_of
 from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
 from app.views.written import trace_view
 from app.words import _
@@ -128,6 +129,7 @@ class Server:
         ghost = ghost_view(state) or compared_ghost(state)
         self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.render_trace(trace_view(state))
+        self._scene.render_halo(halo_of(state, view))
         self._scene.say(overlay_of(state))
         # aimed when asked for, when a take is opened or left, and when the picture is turned
         # otherwise or a hand appears: from the desk all that looks the same
