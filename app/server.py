@@ -135,7 +135,8 @@ class Server:
         # otherwise or a hand appears: from the desk all that looks the same
         fixed = state.view is View.DESK
         turned = None if fixed else (state.yaw, isinstance(view, HandView))
-        aimed = state.aimed, turned, looks_near(state), state.review is not None
+        above = state.review is not None, state.joint.answer is not None
+        aimed = state.aimed, turned, looks_near(state), above
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))

@@ -14,6 +14,7 @@ from app.views import joint as view
 from app.words import _
 
 _NONE = "–"
+_STEP_PX, _ANSWER_PX = (660.0, 300.0), (660.0, 470.0)  # the hand stays in sight above
 
 
 class JointFolder:
@@ -125,8 +126,8 @@ class JointSheet:
         large = state.joint.answer is not None
         if large != self._large:
             self._large = large
-            width, height = (720.0, 700.0) if large else (660.0, 300.0)
-            self._panel.float(x=350.0, y=16.0, width=width, height=height)
+            width, height = _ANSWER_PX if large else _STEP_PX
+            self._panel.float(x=16.0, y=-16.0, width=width, height=height)
         put(self._sheet, content=content)
         put(self._close, label=_("Close") if large else _("Leave"))
 

@@ -183,11 +183,12 @@ def _verdict(answer: JointAnswer, state: State) -> str:
     parts += [_finding(each) for each in study.findings]
     if best is not None:
         parts.append(_centres(study, best))
-        parts.append(small(_where(answer, state)))
     parts.append(
         '<div style="display:flex;gap:1em;flex-wrap:wrap;margin-top:.5em">'
         f"{cloud_picture(study)}{class_histogram(study)}</div>"
     )
+    if best is not None:
+        parts.append(small(_where(answer, state)))
     source = answer.source or _("virtual finger")
     parts.append(small(_("{source}, {frames} frames").format(source=source, frames=study.frames)))
     return _frame("".join(parts))

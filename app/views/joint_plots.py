@@ -10,7 +10,7 @@ from app.views.pieces import GREEN, GREY
 from app.words import _
 from handstudio.trackers.study import JointStudy
 
-_SIDE, _WIDE, _HIGH = 250.0, 340.0, 250.0
+_SIDE, _WIDE, _HIGH = 180.0, 330.0, 180.0
 _RINGS_DEG = (10.0, 30.0, 60.0, 90.0)
 _TEXT = 'font-size="11" fill="currentColor"'
 
