@@ -103,8 +103,10 @@ _MANY = 24
 
 
 def sheet_html(state: State) -> str:
-    """What is going on or came of it; empty: nothing, there is no sheet."""
+    """What is going on or came of it; empty: nothing, or a course of the glove is in its place."""
     finding = state.joint
+    if state.guided is not None or state.result is not None:
+        return ""
     if isinstance(finding.answer, JointAnswer):
         return _verdict(finding.answer, state)
     if finding.answer is not None:

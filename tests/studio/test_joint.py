@@ -215,7 +215,7 @@ def test_swapped_and_frozen_terminals_end_in_words(
     change: Callable[[Track, Track], tuple[Track, Track]],
     words: str,
 ) -> None:
-    # the transmitter stands in the room, and the arm does not turn: the lower turns further
+    # the transmitter is on the palm: of both terminals the lower one turns further
     given(studio, "bad.csv", table(*change(finger.upper, finger.lower)))
     state = found(studio, "up", "low")
     assert words in view.sheet_html(state)
@@ -292,4 +292,7 @@ def test_the_halo_is_round_the_joint_of_the_hand_and_as_large_as_the_doubt(
     assert sd < halo.radius_m < sd + 0.02
     assert "is not known" in view.sheet_html(state)
     assert view.halo_of(state, None) is None
+    during = after(streaming, intents.BeginCourse("quick_start"))
+    assert during.guided is not None
+    assert view.sheet_html(during) == "", "its sheet stands in the same place"
     assert view.halo_of(after(streaming, intents.CloseJoint()), hand) is None
