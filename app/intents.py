@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from app.joint_work import JointOrder
 from app.look import View
 from handstudio.export.part import Content
 from handstudio.hand.skeleton import HandType
@@ -491,6 +492,34 @@ class ResetHeading:
     sensor: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class GiveTracks:
+    """Look into a file of a tracker: one of this computer, or one that a page sent."""
+
+    name: str
+    content: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FindJoint:
+    """Find the joint between two terminals of the file that was given."""
+
+    order: JointOrder
+
+
+@dataclass(frozen=True, slots=True)
+class TryVirtualFinger:
+    """A virtual finger with a tracker goes through the guided finding of this joint."""
+
+    joint: str
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
+class CloseJoint:
+    """What came of finding a joint was seen; or it is no longer wanted."""
+
+
 Move: TypeAlias = TogglePlay | Seek | Step | SetSpeed | MarkIn | MarkOut | WholeTake | SetLoop
 """What moves through the open take."""
 
@@ -566,4 +595,8 @@ Intent: TypeAlias = (
     | CloseResult
     | UseCalibration
     | ResetHeading
+    | GiveTracks
+    | FindJoint
+    | TryVirtualFinger
+    | CloseJoint
 )

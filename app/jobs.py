@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from app.found import Found, found_in
+from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
 from handstudio.analysis.stretches import Stretch
@@ -27,6 +28,7 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.wizards.joint_course import JointCourse, Poses
 
 Beside: TypeAlias = tuple[Path | None, Path | None]
 """The takes that measures are held against: an earlier one, and one of the other hand."""
@@ -124,6 +126,21 @@ class Jobs:
         self._reset()
         return self._pool.submit(_solve, course, tuple(paths), sessions, hand_type)
 
+    def find_joint(self, order: JointOrder) -> Future[JointAnswer]:
+        """Find the joint between two terminals of a file."""
+        self._reset()
+        return self._pool.submit(_find_joint, order)
+
+    def virtual_finger(self, joint: str, number: int) -> Future[Finger]:
+        """Let a virtual person bend a joint, a terminal on each side of it."""
+        self._reset()
+        return self._pool.submit(_virtual_finger, joint, number)
+
+    def judge_joint(self, course: JointCourse, piece: Poses, finger: Finger) -> Future[JointAnswer]:
+        """Find the joint at the end of a guided course."""
+        self._reset()
+        return self._pool.submit(_judge_joint, course, piece, finger)
+
     def cancel(self) -> None:
         """Stop the present job at its next step; its future then raises `Stopped`."""
         self._cancelled.value = 1
@@ -218,3 +235,15 @@ def _solve(
     course: str, paths: tuple[Path, ...], sessions: Path, hand_type: HandType | None
 ) -> Answer:
     return solve(course, [open_take(path) for path in paths], sessions, hand_type, _tell)
+
+
+def _find_joint(order: JointOrder) -> JointAnswer:
+    return find_joint(order, _tell)
+
+
+def _virtual_finger(joint: str, number: int) -> Finger:
+    return virtual_finger(joint, number, _tell)
+
+
+def _judge_joint(course: JointCourse, piece: Poses, finger: Finger) -> JointAnswer:
+    return judged(course, piece, finger, _tell)

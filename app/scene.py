@@ -8,6 +8,7 @@ import viser
 from app import colours
 from app.boards import BOARD_M, Boards, boards_of
 from app.bones import BoneSet, bone_sets, hand_length, joint_radii
+from app.halo import HaloNodes
 from app.held import HeldNodes
 from app.ink import InkNodes
 from app.look import DESK_TARGET, Camera
@@ -15,6 +16,7 @@ from app.meshes import mesh
 from app.skin import SkinNodes
 from app.views.course import GhostView
 from app.views.held import HeldView
+from app.views.joint import HaloView
 from app.views.page import HandView, SensorsView
 from app.views.written import TraceView
 from handstudio.arrays import Array
@@ -48,6 +50,7 @@ class Scene:
         self._ghost = _GhostNodes(server)
         self._ink = InkNodes(server)
         self._held = HeldNodes(server)
+        self._halo = HaloNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
         self._dark: bool | None = None
@@ -82,6 +85,10 @@ class Scene:
     def render_held(self, view: HeldView | None) -> None:
         """Show what the hand holds, or nothing."""
         self._held.render(view)
+
+    def render_halo(self, view: HaloView | None) -> None:
+        """Show how well a joint was found, or nothing."""
+        self._halo.render(view)
 
     def say(self, words: str) -> None:
         """Words in the middle of the picture; none: nothing."""

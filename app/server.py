@@ -20,6 +20,7 @@ from app.studio import Studio
 from app.views.comparison import compared_ghost
 from app.views.course import ghost_view
 from app.views.held import held_view
+from app.views.joint import halo_of
 from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
 from app.views.written import trace_view
 from app.words import _
@@ -130,12 +131,14 @@ class Server:
         self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.render_trace(trace_view(state))
         self._scene.render_held(held_view(state, view))
+        self._scene.render_halo(halo_of(state, view))
         self._scene.say(overlay_of(state))
         # aimed when asked for, when a take is opened or left, and when the picture is turned
         # otherwise or a hand appears: from the desk all that looks the same
         fixed = state.view is View.DESK
         turned = None if fixed else (state.yaw, isinstance(view, HandView))
-        aimed = state.aimed, turned, looks_near(state), state.review is not None
+        above = state.review is not None, state.joint.answer is not None
+        aimed = state.aimed, turned, looks_near(state), above
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))

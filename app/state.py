@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from app.guided import Guided, InUse, Result, Stand
+from app.joint_work import JointAnswer, TrackFile
 from app.live import LiveHistory
 from app.look import View
 from app.review import Review
@@ -16,10 +17,12 @@ from app.taking import BLIP_S, Countdown, Disk
 from handstudio.device import find
 from handstudio.device.find import Found
 from handstudio.device.orders import Newest
+from handstudio.errors import HandstudioError
 from handstudio.recording.bin import Binned
 from handstudio.recording.library import Entry
 from handstudio.recording.subjects import Subject
 from handstudio.settings import Settings
+from handstudio.wizards.joint_course import JointCourse
 
 HAND_LENGTH_MM = (120.0, 240.0)
 """Plausible hand lengths, children to the largest adults [mm]."""
@@ -68,6 +71,29 @@ class Shelf:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class JointFinding:
+    """A joint that is being found by trackers, or was.
+
+    Attributes:
+        file: The tracker's file that was given.
+        problem: Why the last one that was given cannot be used.
+        reading: One is being looked into.
+        joint: Which joint of the hand is sought.
+        course: The guided course that a virtual finger goes through.
+        working: It is being computed.
+        answer: What came of it, until somebody has seen it.
+    """
+
+    file: TrackFile | None = None
+    problem: HandstudioError | None = None
+    reading: bool = False
+    joint: str = ""
+    course: JointCourse | None = None
+    working: bool = False
+    answer: JointAnswer | HandstudioError | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class State:
     """Everything the page is drawn from.
 
@@ -84,6 +110,7 @@ class State:
         away_s: How long no take could begin, as the device sends nothing or nobody is known [s].
         guided: The course that is on.
         result: What came of the last course, until somebody has seen it.
+        joint: What is found of a joint by trackers.
         asking: The page that must say whose hand it is before a take can begin.
         asking_for: The course that waits for that; empty: a take.
     """
@@ -109,6 +136,7 @@ class State:
     preparing: Preparing = "no"
     guided: Guided | None = None
     result: Result | None = None
+    joint: JointFinding = JointFinding()
     work: Work | None = None
     view: View = View.DESK
     aimed: int = 0

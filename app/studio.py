@@ -20,6 +20,7 @@ from app.calibrating import Calibrator
 from app.filtering import Chooser, Prepared
 from app.holding import Holder
 from app.jobs import Jobs, Stopped
+from app.joint_finding import JointFinder
 from app.keeping import Keeper
 from app.look import LASTING, View, facing
 from app.looking import Looked, Looker
@@ -37,6 +38,7 @@ from app.workshop import (
     FoundIn,
     Gathered,
     MeasuredPart,
+    OfJoint,
     Previewed,
     Solved,
     Surveyed,
@@ -99,6 +101,7 @@ class Studio:
         self._looker = Looker(self._inbox.put)
         self._workshop = Workshop(self.jobs)
         self._reviewer = Reviewer(self._workshop)
+        self._joints = JointFinder(self._workshop)
         self._now_s = 0.0
         self._solving = False  # a calibration was ordered
         self._toggled_s = self._guided_s = -1.0
@@ -129,6 +132,8 @@ class Studio:
         self._finish_work()
         self._take_on(elapsed_s)
         self._guide_on(elapsed_s)
+        self._joints.tick(elapsed_s)
+        self.state = replace(self.state, joint=self._joints.finding)
         self.state = replace(self.state, preparing=self._chooser.follow(self.state))
         idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
         self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
@@ -156,7 +161,14 @@ class Studio:
                 case Looked():
                     self._hear_looker(item)
                 case _ if not any(
-                    each(item) for each in (self._guide, self._obey, self._keep, self._prefer)
+                    each(item)
+                    for each in (
+                        self._guide,
+                        self._joints.hear,
+                        self._obey,
+                        self._keep,
+                        self._prefer,
+                    )
                 ):
                     self._move(item)
         except HandstudioError as error:
@@ -724,6 +736,8 @@ class Studio:
                     self._solving = False
                     self._calibrator.solved(answer)
                     self._use(answer)
+                case OfJoint():
+                    self._joints.done(outcome)
                 case HandstudioError():
                     self._tell_why(outcome)
                 case _:

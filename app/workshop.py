@@ -12,6 +12,7 @@ from typing import Any
 from app.found import Found
 from app.intents import Export
 from app.jobs import Beside, Jobs
+from app.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_into
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
@@ -25,6 +26,7 @@ from handstudio.process import process_head
 from handstudio.recording.parcel import SUFFIX, pack, take_in
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
+from handstudio.wizards.joint_course import JointCourse, Poses
 
 _IMPORTED = "imported"
 """Whose takes raw folders are that do not say."""
@@ -132,8 +134,16 @@ class FoundIn:
     found: Found
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class OfJoint:
+    """The next of finding a joint by trackers: what was looked into, bent, found; or why not."""
+
+    number: int  # as it was ordered
+    told: TrackFile | Finger | JointAnswer | HandstudioError
+
+
 Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
-    FoundIn | Trimmed | Added | Exported | Gathered | Solved
+    FoundIn | Trimmed | Added | Exported | Gathered | Solved | OfJoint
 )
 
 
@@ -292,6 +302,31 @@ class Workshop:
         future = self.jobs.solve(course, paths, sessions, hand_type)
         words = _("Computing the calibration")
         self._pending.append(_Pending(future, Solved, words, Solved))
+
+    def look_into_tracks(self, number: int, name: str, content: bytes | None) -> None:
+        """What a file of a tracker holds."""
+        words = _("Reading {name}").format(name=Path(name).name)
+        self._of_joint(number, self._aside.submit(looked_into, name, content), words)
+
+    def find_joint(self, number: int, order: JointOrder) -> None:
+        """The joint between two terminals of a file."""
+        self._of_joint(number, self.jobs.find_joint(order), _("Finding the joint"))
+
+    def bend_virtual_finger(self, number: int, joint: str, person: int) -> None:
+        """A virtual finger with a tracker."""
+        future = self.jobs.virtual_finger(joint, person)
+        self._of_joint(number, future, _("Preparing a virtual finger"))
+
+    def judge_joint(self, number: int, course: JointCourse, piece: Poses, finger: Finger) -> None:
+        """The joint at the end of a guided course."""
+        future = self.jobs.judge_joint(course, piece, finger)
+        self._of_joint(number, future, _("Finding the joint"))
+
+    def _of_joint(self, number: int, future: Future[Any], words: str) -> None:
+        def use(told: TrackFile | Finger | JointAnswer | HandstudioError) -> Outcome:
+            return OfJoint(number, told)
+
+        self._pending.append(_Pending(future, use, words, use))
 
     def cancel(self) -> None:
         """Stop what is on."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 
 class HandstudioError(Exception):
@@ -44,6 +44,11 @@ class HandstudioError(Exception):
             return what, remedy
         said = {name: _said(value, translate) for name, value in self._values.items()}
         return what.format(**said), remedy.format(**said)
+
+    def about(self, **values: object) -> Self:
+        """The same error with other values, as far as its words hold them."""
+        known = {name: value for name, value in values.items() if name in self._values}
+        return type(self)(*self._templates, **{**self._values, **known})
 
     def __reduce__(self) -> tuple[object, ...]:
         """Errors travel between processes, which an exception's own way does not allow here."""

@@ -16,6 +16,14 @@ def test_values_stand_in_the_words_of_any_language() -> None:
     assert error.in_words(lambda text: catalogue.get(text, text)) == ("3 de a", "Copy a again.")
 
 
+def test_the_same_error_about_something_else() -> None:
+    error = TakeError("{path}: {rows} rows.", "Copy {path}.", path="/tmp/x/a", rows=3)
+    other = error.about(path="a", unheard_of=1)
+    assert isinstance(other, TakeError)
+    assert (other.what, other.remedy) == ("a: 3 rows.", "Copy a.")
+    assert error.what == "/tmp/x/a: 3 rows."
+
+
 def test_words_without_values_are_taken_literally() -> None:
     assert HandstudioError("{not a name", "{}").what == "{not a name"
 

@@ -10,6 +10,7 @@ import viser
 from app import intents
 from app.guided import Stand
 from app.panels.base import QUIET, Send, page_of, put, typed
+from app.panels.joint import JointFolder
 from app.state import State
 from app.views import calibration as calibration_view
 from app.views import course as view
@@ -65,6 +66,7 @@ class CalibratePanel:
                 color=QUIET,
                 hint=_("As the hand lies now, forearm ahead; key: H, all sensors"),
             )
+        self._joint = JointFolder(gui, send)
         self._step.on_update(typed(self._pick))
         self._redo.on_click(lambda _event: self._say_redo(send))
         self._palm.on_update(typed(lambda palm: send(intents.SetHandType(_palms()[palm]))))
@@ -99,6 +101,7 @@ class CalibratePanel:
         sensors = (self._all, *(setup.layout.names if setup is not None else ()))
         put(self._which, options=sensors)
         put(self._reset, disabled=state.newest.phase is not Phase.STREAMING)
+        self._joint.render(state)
 
     def _render_steps(self, choices: dict[str, int], index: int) -> None:
         """Follow the course; what somebody picked stays theirs while it goes on by itself."""

@@ -13,6 +13,7 @@ from app.look import View
 from app.panels.base import QUIET, Send, page_of, put
 from app.panels.calibrate import CalibratePanel, CoursePanel
 from app.panels.device import DevicePanel
+from app.panels.joint import JointSheet
 from app.panels.library import LibraryPanel
 from app.panels.looks import LooksPanel
 from app.panels.plots import PlotsPanel
@@ -65,6 +66,7 @@ class Page:
         self._transport = TransportPanel(gui, send)
         self._recording = RecordingPanel(gui, send)
         self._course = CoursePanel(gui, send)
+        self._joint = JointSheet(gui, send)
         self._looks = LooksPanel(gui, send, state)
         self._tick = 0
         self._silence_at = 0
@@ -79,6 +81,7 @@ class Page:
             self._transport.render(state)
             self._recording.render(state)
             self._course.render(state)
+            self._joint.render(state)
             self._render_plots(state)
         if self._tick % TEXTS_EVERY == 0 or state.messages:
             self._render_texts(state)

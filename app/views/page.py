@@ -166,7 +166,8 @@ def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
         camera = camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
     else:
         camera = camera_for(state.view, None, None, 0.0)
-    return camera if state.review is None else lowered(camera, ABOVE_SHEET)
+    above = state.review is not None or state.joint.answer is not None
+    return lowered(camera, ABOVE_SHEET) if above else camera
 
 
 def curves_of(state: State) -> Curves | None:

@@ -71,6 +71,7 @@ class JointStudy:
         refused: Methods that refuse, and why.
         findings: What is wrong with the tracks.
         poor: What makes the chosen (first) one doubtful; empty: it is good.
+        width: Unit axis across the finger that shares and signs of axes are by.
     """
 
     upper: str
@@ -85,6 +86,7 @@ class JointStudy:
     refused: dict[str, TrackError]
     findings: tuple[TrackFinding, ...]
     poor: tuple[TrackError, ...]
+    width: Float[Array, "3"]
 
     @property
     def ok(self) -> bool:
@@ -135,7 +137,10 @@ def study(
     best = next(iter(found.values()), None)
     if best is not None:
         findings = (*findings, *_metal(pair, best.estimate, upper.name, lower.name))
-    return _put_together(pair, axes, (upper.name, lower.name), (found, refused), findings)
+    across = np.asarray(width / np.linalg.norm(width))
+    return _put_together(
+        pair, axes, (upper.name, lower.name), (found, refused), findings, width=across
+    )
 
 
 def bend_of(pair: Pair) -> float:
@@ -183,6 +188,8 @@ def _put_together(
     names: tuple[str, str],
     results: tuple[dict[str, Found], dict[str, TrackError]],
     findings: tuple[TrackFinding, ...],
+    *,
+    width: Float[Array, "3"],
 ) -> JointStudy:
     shown = np.flatnonzero(np.isfinite(axes.along))
     shown = shown[:: max(1, -(-len(shown) // _CLOUD))]
@@ -200,6 +207,7 @@ def _put_together(
         refused,
         findings,
         tuple(_poor(bend, next(iter(found.values()), None), refused)),
+        width,
     )
 
 

@@ -14,6 +14,7 @@ from app import intents
 from app import review as reviewing
 from app.found import Found, found_in
 from app.jobs import Beside, Jobs
+from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.review import Review
 from app.state import State
@@ -38,6 +39,7 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.wizards.joint_course import JointCourse, Poses
 
 TICK_S = 0.016
 
@@ -126,6 +128,19 @@ class PromptJobs:
             return save_report(made.html, report_path(path, language))
 
         return done(work)
+
+    def find_joint(self, order: JointOrder) -> Future[JointAnswer]:
+        return done(lambda: find_joint(order, _untold))
+
+    def virtual_finger(self, joint: str, number: int) -> Future[Finger]:
+        return done(lambda: virtual_finger(joint, number, _untold))
+
+    def judge_joint(self, course: JointCourse, piece: Poses, finger: Finger) -> Future[JointAnswer]:
+        return done(lambda: judged(course, piece, finger, _untold))
+
+
+def _untold(_share: float) -> None:
+    pass
 
 
 def _opened(beside: Beside) -> dict[str, Any]:
