@@ -265,7 +265,7 @@ class Studio:
                 if course:
                     self._guide(intents.BeginCourse(course))
                 if then_record:
-                    self._toggle_recording(page=-1)
+                    self._record_or_stop(page=-1)
             case intents.DeleteSubject(code=code, typed=typed):
                 self._refuse_while_working()
                 if review is not None and review.take.header.subject == code:
@@ -500,6 +500,9 @@ class Studio:
         if self._now_s - self._toggled_s < _ONCE_S:
             return
         self._toggled_s = self._now_s
+        self._record_or_stop(page)
+
+    def _record_or_stop(self, page: int) -> None:
         if self.state.newest.recorder is not None:
             self._taker.stop()
             self._sound(Sound.STOP)

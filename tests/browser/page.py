@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from contextlib import suppress
 
 import numpy as np
 import PIL.Image
@@ -57,6 +58,16 @@ def settles_within(page: Page, seconds: float) -> bool:
 
 def button(page: Page, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
+
+
+def press_until(page: Page, name: str, seen: Locator) -> None:
+    """Press a button; again, as a person does, where it was drawn anew beneath the pointer."""
+    for _ in range(3):
+        button(page, name).click()
+        with suppress(AssertionError):
+            expect(seen).to_be_visible(timeout=10_000)
+            return
+    expect(seen).to_be_visible()
 
 
 def begin_recording(page: Page) -> None:

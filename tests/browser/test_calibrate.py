@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from handstudio.recording.notes import load_notes
 
 from .conftest import RunningStudio, Start, free_port, glove
-from .page import button
+from .page import button, press_until
 
 pytestmark = pytest.mark.browser
 
@@ -48,8 +48,7 @@ def test_the_first_steps_are_done_alone_and_gone_on_with_later(
     studio, page = begin(start_studio, visit, "virtual:?subject=7&imperfections=typical&speed=2")
     expect(page.get_by_text("Step 5 of 32")).to_be_visible(timeout=120_000)
     assert labels(studio)[:4] == ["fit", "static", "heading_rotation", "static"]
-    button(page, "Leave").click()
-    expect(page.get_by_text("The course waits under Calibrate")).to_be_visible()
+    press_until(page, "Leave", page.get_by_text("The course waits under Calibrate"))
     # what every take begins with belongs to that take: nothing of this one is gone on with
     expect(button(page, "Begin: Hand")).to_be_visible()
     expect(button(page, "Record")).to_be_enabled()

@@ -193,7 +193,7 @@ def test_a_take_keeps_the_filter_it_began_with_and_the_other_comes_after(connect
     connected.go_on(30)
     take = connected.stop_take()
     assert take.header.setup.filter == VqfFilter()
-    connected.check(take)
+    connected.check(take, unheard=10)
     connected.until(lambda newest: newest.setup.filter == RawFilter(), "it is used")
 
 

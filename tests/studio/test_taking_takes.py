@@ -39,6 +39,12 @@ def test_who_was_typed_is_kept_and_recorded(streaming: Studio, capture: StillCap
     assert (subject.side, subject.hand_length_mm) == ("left", 171.0)
 
 
+def test_who_types_fast_records_too(streaming: Studio, capture: StillCapture) -> None:
+    after(streaming, intents.ChooseSubject(""), intents.ToggleRecording(page=7))
+    after(streaming, intents.SaveSubject("P7", "left", 171.0, then_record=True))
+    assert isinstance(capture.orders[-1], StartTake)
+
+
 def test_a_hand_of_no_length_is_brought_to_one_there_is(streaming: Studio) -> None:
     state = after(streaming, intents.SaveSubject("P8", "right", 1000.0))
     assert state.hand_length_mm == 240.0
