@@ -8,10 +8,8 @@ from app.intents import CloseJoint, FindJoint, GiveTracks, Intent, TryVirtualFin
 from app.joint_work import Finger, JointAnswer, TrackFile, unfinished
 from app.state import JointFinding
 from app.workshop import OfJoint, Workshop
-from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
 from handstudio.trackers.methods import method_named
-from handstudio.trackers.track import Track
 from handstudio.wizards.joint_course import (
     Begin,
     JointCourse,
@@ -116,23 +114,13 @@ class JointFinder:
             )
             self._finger = None
             self.finding = replace(self.finding, working=True)
-            piece = Poses(_cut(finger.upper, used), _cut(finger.lower, used))
+            piece = Poses(finger.upper[used], finger.lower[used])
             self.workshop.judge_joint(self._number, course, piece, finger)
             return
-        piece = Poses(_cut(finger.upper, used), _cut(finger.lower, used))
+        piece = Poses(finger.upper[used], finger.lower[used])
         self.finding = replace(self.finding, course=advance(course, piece))
 
     def _begin(self, joint: str) -> None:
         self._count += 1
         self._number, self._finger = self._count, None
         self.finding = replace(self.finding, joint=joint, course=None, answer=None, working=True)
-
-
-def _cut(track: Track, used: Array) -> Track:
-    return Track(
-        track.name,
-        track.time_us[used],
-        track.t_room_terminal[used],
-        track.q_room_terminal[used],
-        track.quality[used],
-    )

@@ -171,10 +171,4 @@ def _windowed(track: Track, start_s: float, end_s: float | None) -> Track:
             start=start_s,
             seconds=float(time_s.max(initial=0.0)),
         )
-    return Track(
-        track.name,
-        track.time_us[used],
-        track.t_room_terminal[used],
-        track.q_room_terminal[used],
-        track.quality[used],
-    )
+    return track[used]

@@ -34,9 +34,14 @@ def write_json(path: Path, value: msgspec.Struct) -> None:
     try:
         write_atomically(path, msgspec.json.format(msgspec.json.encode(value)))
     except OSError as error:
-        raise TakeError(
-            "{path}: cannot be written ({reason}).",
-            "Free some space or check the folder's permissions.",
-            path=path,
-            reason=error.strerror or error,
-        ) from error
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: Path, error: OSError) -> TakeError:
+    """Why a file cannot be written, and what to do."""
+    return TakeError(
+        "{path}: cannot be written ({reason}).",
+        "Free some space or check the folder's permissions.",
+        path=path,
+        reason=error.strerror or error,
+    )

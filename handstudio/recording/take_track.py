@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from handstudio.errors import TakeError
+from handstudio.recording.atomic import unwritable
 from handstudio.recording.naming import take_stem
 from handstudio.trackers.track import Track
 
@@ -77,12 +78,7 @@ def save_track(take: Path, kept: KeptTrack) -> None:
             )
         fresh.replace(path)
     except OSError as error:
-        raise TakeError(
-            "{path}: cannot be written ({reason}).",
-            "Free some space or check the folder's permissions.",
-            path=path,
-            reason=error.strerror or error,
-        ) from error
+        raise unwritable(path, error) from error
 
 
 def load_track(take: Path) -> KeptTrack | None:

@@ -27,3 +27,12 @@ class Track:
     t_room_terminal: Float[Array, "n 3"]
     q_room_terminal: Float[Array, "n 4"]
     quality: Float[Array, " n"]
+
+    def __getitem__(self, part: slice | Array) -> Track:
+        return Track(
+            self.name,
+            self.time_us[part],
+            self.t_room_terminal[part],
+            self.q_room_terminal[part],
+            self.quality[part],
+        )

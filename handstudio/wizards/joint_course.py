@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3
 from handstudio.trackers.findings import seen_at
@@ -129,7 +128,7 @@ def _seen(course: JointCourse) -> JointCourse:
             course, phase=JointPhase.BENDING, moved=moved, done_s=1e-6 * (now_us - straight_us)
         )
     used = (upper.time_us >= begins_us) & (upper.time_us < end_us)
-    upper, lower = _cut(upper, used), _cut(lower, used)
+    upper, lower = upper[used], lower[used]
     rest = upper.time_us < straight_us
     course = replace(course, phase=JointPhase.VERDICT, moved=moved, done_s=0.0, pieces=())
     try:
@@ -143,7 +142,7 @@ def _straight_since(upper: Track, lower: Track) -> tuple[int | None, int]:
     seen = np.flatnonzero(seen_at(upper) & seen_at(lower))
     if not len(seen):
         return None, 0
-    a, b = _cut(upper, seen), _cut(lower, seen)
+    a, b = upper[seen], lower[seen]
     q, _ = seen_from(a.q_room_terminal, a.t_room_terminal, b.q_room_terminal, b.t_room_terminal)
     start, moved = 0, 0
     while True:
@@ -159,13 +158,3 @@ def _whole(pieces: list[Track]) -> Track:
     fields = ("time_us", "t_room_terminal", "q_room_terminal", "quality")
     first = pieces[0]
     return Track(first.name, *(np.concatenate([getattr(p, f) for p in pieces]) for f in fields))
-
-
-def _cut(track: Track, used: Array) -> Track:
-    return Track(
-        track.name,
-        track.time_us[used],
-        track.t_room_terminal[used],
-        track.q_room_terminal[used],
-        track.quality[used],
-    )
