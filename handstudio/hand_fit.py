@@ -14,6 +14,8 @@ from handstudio.calibration.mounting import nominal_mounting, nominal_places
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.errors import LayoutError
 from handstudio.fusion.mechanism import AS_SHIPPED, CALIBRATED, FREE, Mechanism, bare
+from handstudio.hand.angles import ROTATION, hand_angles, sign_of
+from handstudio.hand.possible import possible
 from handstudio.hand.skeleton import (
     FINGERS,
     JOINTS,
@@ -222,6 +224,17 @@ def hand_mechanism(
             q_parent_segment, centre - t_segment_sensor[parent]
         )
         found.axis_sd_rad[sensor] = _axis_sd(joint.name, axes, known, calibration is not None)
+        found.range_rad[sensor] = _range(joint.name, fit.skeleton.side)
+    return found
+
+
+def _range(joint: str, side: HandSide) -> Array:
+    """What the joint's flexion and deviation can be, as turns about x and z of its frame."""
+    found = np.tile([-np.inf, np.inf], (2, 1))
+    for angle in hand_angles():
+        ends = possible(angle)
+        if angle.joint == joint and angle.turn != ROTATION and ends is not None:
+            found[angle.turn] = np.sort(sign_of(angle, side) * np.deg2rad(ends))
     return found
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from handstudio.arrays import Array
-from handstudio.hand.angles import Angle
+from handstudio.hand.possible import possible
 from handstudio.hand_fit import fit_of
 from handstudio.kinematics import angles_of, measured_angles
 from handstudio.maths import so3
@@ -45,22 +45,6 @@ class Stretch(msgspec.Struct, frozen=True):
 
 MOST = 200
 """Stretches of a kind that are told; where there are more, neighbours are joined."""
-
-POSSIBLE_DEG = {
-    "mcp_flexion": (-65.0, 115.0),
-    "pip_flexion": (-35.0, 135.0),
-    "dip_flexion": (-45.0, 115.0),
-    "ip_flexion": (-60.0, 115.0),
-    "thumb_mcp_flexion": (-50.0, 90.0),
-    "mcp_abduction": (-45.0, 45.0),
-    "thumb_cmc_flexion": (-60.0, 60.0),
-    "thumb_cmc_abduction": (-40.0, 95.0),
-    "wrist_flexion": (-95.0, 105.0),
-    "wrist_deviation_ulnar": (-45.0, 60.0),
-}
-"""What joints of healthy hands do not go beyond [deg]: the normal active ranges of AAOS and ASSH
-with 20 degrees or more to each side, for lax joints and for an average hand's zero. Beyond, the
-first suspect is a sensor that has slipped or a heading that is wrong."""
 
 _STEP_S = 0.1
 _LASTS_S = 0.3  # what is shorter is a glitch of one instant, and no posture
@@ -122,8 +106,8 @@ def _doubts(setup: Setup, motion: Motion, time_s: Float[Array, " n"]) -> list[St
 def _impossible(
     setup: Setup, thin: Motion, time_s: Float[Array, " m"], progress: Callable[[float], None]
 ) -> list[Stretch]:
-    angles = [angle for angle in measured_angles(setup.layout) if _limits(angle) is not None]
-    limits = np.array([_limits(angle) for angle in angles])
+    angles = [angle for angle in measured_angles(setup.layout) if possible(angle) is not None]
+    limits = np.array([possible(angle) for angle in angles])
     fit, block = fit_of(setup), 2000
     beyond = np.zeros((len(thin), len(angles)))
     for begin in range(0, len(thin), block):
@@ -142,12 +126,6 @@ def _impossible(
         ends = float(time_s[begin]), float(time_s[end])
         found.append(Stretch("impossible", *ends, names, float(worst.max())))
     return found
-
-
-def _limits(angle: Angle) -> tuple[float, float] | None:
-    """Of the angle itself, else of its like on any finger."""
-    _finger, _sep, like = angle.name.partition("_")
-    return POSSIBLE_DEG.get(angle.name, POSSIBLE_DEG.get(like))
 
 
 def _drifts(setup: Setup, thin: Motion, time_s: Float[Array, " m"]) -> list[Stretch]:

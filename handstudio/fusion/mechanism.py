@@ -47,6 +47,8 @@ class Mechanism:
             (4.21).
         chain_root: Which sensor of the root's segment stands first in the chain to a sensor, for
             filters over chains; -1: the one that `parent` leads to.
+        range_rad: Between which turns about its flexion axis (x), and then about its second (z),
+            the joint can be; infinite where nothing is known.
         gyr_share: What gyroscopes err, as a share of the rate.
         mean_rates: A rate is the mean since the sample before, as of sensors that sample faster
             than they tell; else it is that of the instant.
@@ -62,6 +64,7 @@ class Mechanism:
     lever_sd_m: Float[Array, " s"]
     heading_rad: Float[Array, " s"]
     chain_root: Int[Array, " s"]
+    range_rad: Float[Array, "s 2 2"]
     gyr_share: float = AS_SHIPPED
     mean_rates: bool = False
 
@@ -95,4 +98,5 @@ def bare(sensors: int) -> Mechanism:
         lever_sd_m=np.full(sensors, _BARE_LEVER_SD_M),
         heading_rad=np.zeros(sensors),
         chain_root=np.full(sensors, -1),
+        range_rad=np.tile([-np.inf, np.inf], (sensors, 2, 1)),
     )

@@ -361,7 +361,9 @@ def _array(got: _Packed, name: str) -> Array:
 @lru_cache(maxsize=16)  # asked for with every chunk of a stream
 def _as_arrays(mechanism: Mechanism) -> Joints:
     """What the kernel is told of the joints: their axes in both sensors."""
-    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    x, y, z = np.eye(3)
+    low, high = mechanism.range_rad[..., 0], mechanism.range_rad[..., 1]
+    known = np.isfinite(low) & np.isfinite(high)
     return Joints(
         mechanism.order,
         mechanism.parent,
@@ -369,11 +371,15 @@ def _as_arrays(mechanism: Mechanism) -> Joints:
         mechanism.t_parent_joint,
         mechanism.t_sensor_joint,
         so3.rotate(mechanism.q_parent_joint, x),
+        so3.rotate(mechanism.q_parent_joint, y),
         so3.rotate(mechanism.q_sensor_joint, x),
+        so3.rotate(mechanism.q_sensor_joint, y),
         so3.rotate(mechanism.q_sensor_joint, z),
         mechanism.axis_sd_rad,
         mechanism.lever_sd_m,
         mechanism.heading_rad,
+        0.5 * np.add(low, high, where=known, out=np.zeros_like(low)),
+        0.5 * np.subtract(high, low, where=known, out=np.full_like(low, np.inf)),
         mechanism.gyr_share,
         mechanism.mean_rates,
     )

@@ -64,6 +64,7 @@ def observe(beliefs, m, st, dt, gyr, flags, w):
                 _shared_force(beliefs, m, st, s, period, w)
             if m.axes[s] <= 2:
                 _axes(beliefs, m, st, s, period, w)
+            _ranges(beliefs, m, st, s, period, w)
         if usable and flag & FRESH:
             _compass(beliefs, m, st, s, period, w)
 
@@ -181,6 +182,56 @@ def _axes(beliefs, m, st, s, period, w):
 
 @compiled
 @no_type_check
+def _ranges(beliefs, m, st, s, period, w):
+    """A joint is nowhere it cannot be: beyond an end it is led back, within nothing is told.
+
+    The child's bone in the joint's frame in the parent tells both turns: it is turned about x, then
+    about z, and along it what is turned about y does not show.
+    """
+    if not (np.isfinite(m.half[s, 0]) or np.isfinite(m.half[s, 1])):
+        return
+    p, bone, x, y = m.parent[s], w.vx, w.vy, w.vz
+    rotated(w.rot[s], m.yc[s], bone)
+    rotated(w.rot[p], m.xp[s], x)
+    rotated(w.rot[p], m.yp[s], y)
+    across = bone[0] * x[0] + bone[1] * x[1] + bone[2] * x[2]
+    along = bone[0] * y[0] + bone[1] * y[1] + bone[2] * y[2]
+    z0, z1, z2 = x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
+    up = bone[0] * z0 + bone[1] * z1 + bone[2] * z2
+    flat = np.sqrt(along * along + up * up)
+    if flat < _UPRIGHT:  # the two turns are not told apart
+        return
+    _led_back(beliefs, m, st, s, 0, np.arctan2(up, along), x, period, w)
+    y[0] = (along * z0 - up * y[0]) / flat  # z, turned about x as the bone is
+    y[1] = (along * z1 - up * y[1]) / flat
+    y[2] = (along * z2 - up * y[2]) / flat
+    _led_back(beliefs, m, st, s, 1, np.arctan2(-across, flat), y, period, w)
+
+
+@compiled
+@no_type_check
+def _led_back(beliefs, m, st, s, which, turn, axis, period, w):
+    """One turn of a joint, about an axis of the world: back to the nearer end, if beyond it."""
+    off = turn - m.middle[s, which]
+    off -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
+    beyond = abs(off) - m.half[s, which]
+    if not beyond > 0.0:
+        return
+    p, back = m.parent[s], -beyond if off > 0.0 else beyond
+    # ends have a margin for axes that are off for long: what is off does not count so long here
+    weight = period / ((beliefs.axis_noise**2 + st.slow[s, 0]) * beliefs.axis_lasts_s)
+    for i in range(3):
+        w.pull[p, i] -= weight * axis[i] * back
+        w.pull[s, i] += weight * axis[i] * back
+        for j in range(3):
+            v = weight * axis[i] * axis[j]
+            w.info[p, i, j] += v
+            w.info[s, i, j] += v
+            w.cross[s, i, j] -= v
+
+
+@compiled
+@no_type_check
 def axis_of(rot, axis, turn, out):
     """An axis of a joint in the world: as calibrated, turned by what it was found to be off."""
     t0 = axis[0] + turn[1] * axis[2] - turn[2] * axis[1]
@@ -219,5 +270,6 @@ def _compass(beliefs, m, st, s, period, w):
 
 
 _LEAST_FIELD_UT = 1.0
+_UPRIGHT = 0.1
 _ODD_SHARE, _ODD_DIP = 0.1, float(np.deg2rad(10.0))  # from where a field counts as disturbed
 _USUAL_S = 20.0  # over which a sensor's usual field is averaged

@@ -12,7 +12,7 @@ import pytest
 
 from handstudio import pipeline
 from handstudio.arrays import Array
-from handstudio.fusion.mechanism import bare
+from handstudio.fusion.mechanism import FREE, Mechanism, bare
 from handstudio.fusion.tree_filter import TreeFilter, TreeState
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M
 from handstudio.hand_fit import fit_of, hand_mechanism, mechanism_of
@@ -249,6 +249,46 @@ def test_what_was_learnt_of_one_hands_axes_is_not_believed_of_the_next():
         return rms(np.rad2deg(so3.angle_between(q, truth[1000:1200])))
 
     assert off_at_first(new) < off_at_first(misled)
+
+
+# --- ranges of joints -----------------------------------------------------------------------------
+
+OPEN = np.tile([-np.inf, np.inf], (len(NAMES), 2, 1))
+PROXIMAL = NAMES.index("SN15")
+
+
+def test_within_their_ranges_joints_tell_nothing():
+    samples, _ = performed()
+    joints, tree = mechanism_of(SETUP), TreeFilter()
+    part, begun = samples[:800], tree.begin(len(NAMES), RATE_HZ)
+    ended, open_ended = (
+        tree.run(begun, part, np.ones(800), part.valid, m)[0]
+        for m in (joints, replace(joints, range_rad=OPEN))
+    )
+    np.testing.assert_array_equal(ended, open_ended)
+
+
+@pytest.mark.parametrize("degrees", [-80.0, 80.0])
+def test_a_finger_that_begins_where_none_can_be_is_led_back(degrees):
+    """Its heading is wrong by 80 degrees: more to the side than any finger goes. Nothing moves."""
+    samples, truth = exact()
+    still = without_compass(samples[:200])
+    up = so3.rotate(so3.conjugate(truth[0]), np.array([0.0, 0.0, 9.80665]))
+    still = replace(still, gyr=np.zeros_like(still.gyr), acc=np.tile(up, (200, 1, 1)))
+    tree, joints = TreeFilter(), replace(mechanism_of(SETUP), axes=np.full(len(NAMES), FREE))
+    finger = [NAMES.index(n) for n in ("SN15", "SN16", "SN17")]
+    state = tree.begin(len(NAMES), RATE_HZ)
+    for sensor, q in enumerate(truth[0]):
+        turned = so3.multiply(so3.about_z(np.deg2rad(degrees)), q) if sensor in finger else q
+        sd = np.deg2rad(40.0 if sensor in finger else 5.0)
+        state = tree.place(state, sensor, turned, np.zeros(3), float(sd))
+
+    def off(joints: Mechanism) -> float:
+        q = tree.run(state, still, np.ones(200), still.valid, joints)[0][-1, PROXIMAL]
+        return float(np.rad2deg(so3.angle_between(q, truth[0, PROXIMAL])))
+
+    assert off(joints) < 50.0  # its end is at 45
+    assert off(replace(joints, range_rad=OPEN)) > 75.0
 
 
 # --- named faults ---------------------------------------------------------------------------------
