@@ -10,6 +10,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -33,7 +34,7 @@ from handstudio.smoothing import Smoother
 Progress: TypeAlias = Callable[[float], None]
 """Told the share that is done, 0 to 1."""
 
-_BATCH = 2048  # instants fused at a time: memory does not grow with the take
+_BATCH = 1024  # instants fused at a time: memory does not grow with the take
 
 _KINDS = {
     "time_us": "<i8",
@@ -217,7 +218,7 @@ def _fill(
     whole = max(1, take.summary.bytes if take.summary else take.path.stat().st_size)
     seen = 0
     smoother = Smoother(setup) if setup.smooth else None
-    for batch in _batches(take.events(from_start)):
+    for batch in _ahead(_batches(take.events(from_start))):
         if smoother is None:
             motion, state = pipeline.run(setup, state, batch)
         else:
@@ -259,6 +260,15 @@ def _batches(events: Iterator[list[Event]]) -> Iterator[list[Event]]:
             batch, count = [], 0
     if batch:
         yield _joined(batch)
+
+
+def _ahead(batches: Iterator[list[Event]]) -> Iterator[list[Event]]:
+    """The same, the next one decoded while one is fused: the compiled filter leaves room for it."""
+    with ThreadPoolExecutor(1, "decoding") as reader:
+        coming = reader.submit(next, batches, None)
+        while (batch := coming.result()) is not None:
+            coming = reader.submit(next, batches, None)
+            yield batch
 
 
 def _joined(batch: list[Event]) -> list[Event]:

@@ -362,8 +362,6 @@ def _array(got: _Packed, name: str) -> Array:
 def _as_arrays(mechanism: Mechanism) -> Joints:
     """What the kernel is told of the joints: their axes in both sensors."""
     x, y, z = np.eye(3)
-    low, high = mechanism.range_rad[..., 0], mechanism.range_rad[..., 1]
-    known = np.isfinite(low) & np.isfinite(high)
     return Joints(
         mechanism.order,
         mechanism.parent,
@@ -372,14 +370,26 @@ def _as_arrays(mechanism: Mechanism) -> Joints:
         mechanism.t_sensor_joint,
         so3.rotate(mechanism.q_parent_joint, x),
         so3.rotate(mechanism.q_parent_joint, y),
+        so3.rotate(mechanism.q_parent_joint, z),
         so3.rotate(mechanism.q_sensor_joint, x),
         so3.rotate(mechanism.q_sensor_joint, y),
         so3.rotate(mechanism.q_sensor_joint, z),
         mechanism.axis_sd_rad,
         mechanism.lever_sd_m,
         mechanism.heading_rad,
-        0.5 * np.add(low, high, where=known, out=np.zeros_like(low)),
-        0.5 * np.subtract(high, low, where=known, out=np.full_like(low, np.inf)),
+        _ends(mechanism.range_rad),
         mechanism.gyr_share,
         mechanism.mean_rates,
     )
+
+
+def _ends(range_rad: Float[Array, "s 2 2"]) -> Float[Array, "s 2 3"]:
+    """Ends of the turns as the kernel compares them; where nothing is known none is beyond."""
+    known = np.asarray(np.isfinite(range_rad).all(axis=-1))
+    ends = np.where(known[..., None], range_rad, 0.0)
+    middle, half = 0.5 * (ends[..., 0] + ends[..., 1]), 0.5 * (ends[..., 1] - ends[..., 0])
+    never = np.where(known, np.cos(half), _NEVER)
+    return np.stack([np.cos(middle), np.sin(middle), never], axis=-1)
+
+
+_NEVER = -2.0

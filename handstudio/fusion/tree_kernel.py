@@ -115,7 +115,6 @@ def _compiled(known_by):
             np.zeros((n, 3)),
             np.zeros(3),
             np.zeros(3),
-            np.zeros(3),
             np.zeros(4),
         )
         sweep, x = np.zeros((5, n, 3, 3)), np.zeros((n, 3))

@@ -188,36 +188,36 @@ def _ranges(beliefs, m, st, s, period, w):
     The child's bone in the joint's frame in the parent tells both turns: it is turned about x, then
     about z, and along it what is turned about y does not show.
     """
-    if not (np.isfinite(m.half[s, 0]) or np.isfinite(m.half[s, 1])):
-        return
-    p, bone, x, y = m.parent[s], w.vx, w.vy, w.vz
+    p, bone, v = m.parent[s], w.vx, w.vy
     rotated(w.rot[s], m.yc[s], bone)
-    rotated(w.rot[p], m.xp[s], x)
-    rotated(w.rot[p], m.yp[s], y)
-    across = bone[0] * x[0] + bone[1] * x[1] + bone[2] * x[2]
-    along = bone[0] * y[0] + bone[1] * y[1] + bone[2] * y[2]
-    z0, z1, z2 = x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
-    up = bone[0] * z0 + bone[1] * z1 + bone[2] * z2
+    for i in range(3):
+        v[i] = w.rot[p, 0, i] * bone[0] + w.rot[p, 1, i] * bone[1] + w.rot[p, 2, i] * bone[2]
+    x, y, z = m.xp[s], m.yp[s], m.zp[s]
+    across = v[0] * x[0] + v[1] * x[1] + v[2] * x[2]
+    along = v[0] * y[0] + v[1] * y[1] + v[2] * y[2]
+    up = v[0] * z[0] + v[1] * z[1] + v[2] * z[2]
     flat = np.sqrt(along * along + up * up)
+    flexion, deviation = m.ends[s, 0], m.ends[s, 1]
     if flat < _UPRIGHT:  # the two turns are not told apart
         return
-    _led_back(beliefs, m, st, s, 0, np.arctan2(up, along), x, period, w)
-    y[0] = (along * z0 - up * y[0]) / flat  # z, turned about x as the bone is
-    y[1] = (along * z1 - up * y[1]) / flat
-    y[2] = (along * z2 - up * y[2]) / flat
-    _led_back(beliefs, m, st, s, 1, np.arctan2(-across, flat), y, period, w)
+    if flexion[0] * along + flexion[1] * up < flexion[2] * flat:
+        rotated(w.rot[p], x, v)
+        _led_back(beliefs, st, p, s, np.arctan2(up, along), flexion, v, period, w)
+    if deviation[0] * flat - deviation[1] * across < deviation[2]:
+        for i in range(3):  # z, turned about x as the bone is
+            bone[i] = (along * z[i] - up * y[i]) / flat
+        rotated(w.rot[p], bone, v)
+        _led_back(beliefs, st, p, s, np.arctan2(-across, flat), deviation, v, period, w)
 
 
 @compiled
 @no_type_check
-def _led_back(beliefs, m, st, s, which, turn, axis, period, w):
-    """One turn of a joint, about an axis of the world: back to the nearer end, if beyond it."""
-    off = turn - m.middle[s, which]
+def _led_back(beliefs, st, p, s, turn, ends, axis, period, w):
+    """A turn of a joint, about an axis of the world, is beyond one of its ends: to the nearer."""
+    off = turn - np.arctan2(ends[1], ends[0])
     off -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
-    beyond = abs(off) - m.half[s, which]
-    if not beyond > 0.0:
-        return
-    p, back = m.parent[s], -beyond if off > 0.0 else beyond
+    beyond = abs(off) - np.arccos(ends[2])
+    back = -beyond if off > 0.0 else beyond
     # ends have a margin for axes that are off for long: what is off does not count so long here
     weight = period / ((beliefs.axis_noise**2 + st.slow[s, 0]) * beliefs.axis_lasts_s)
     for i in range(3):

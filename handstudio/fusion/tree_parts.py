@@ -28,15 +28,15 @@ class Joints(NamedTuple):
     tp: Array  # from the parent sensor to the joint
     tc: Array  # from the sensor to the joint
     xp: Array  # flexion axis in the parent sensor
-    yp: Array  # along the bone, the same way
+    yp: Array  # along the bone there
+    zp: Array  # and dorsal
     xc: Array  # and in the sensor
     yc: Array
     zc: Array  # the second axis, in the sensor
     axis_sd: Array
     lever_sd: Array
     heading: Array
-    middle: Array  # of what a joint's two turns can be ...
-    half: Array  # ... and how far to each side; infinite: nothing is known
+    ends: Array  # of both turns: cosine and sine of the middle, cosine of half the range
     gyr_share: float
     mean_rates: bool
 
@@ -73,7 +73,6 @@ class Work(NamedTuple):
     there: Array  # their derivatives
     vx: Array
     vy: Array
-    vz: Array
     quat: Array
 
 
