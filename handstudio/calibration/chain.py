@@ -47,7 +47,8 @@ class Chain:
         covariance: Of them.
         prior_sd: Standard deviations before.
         residual: RMS of what is left [m/s²], by joint.
-        give: How boards tilt where they are accelerated [rad per m/s²], by sensor.
+        soft: How boards tilt where they are accelerated [rad per m/s²]: those of the forearm, all
+            others; and how far they stay behind [m per m/s²].
     """
 
     index: dict[Key, int]
@@ -55,7 +56,7 @@ class Chain:
     covariance: Float[Array, "u u"]
     prior_sd: Float[Array, " u"]
     residual: dict[str, float]
-    give: Float[Array, " s"]
+    soft: Float[Array, " 4"]
 
     def link(self, joint: str) -> tuple[Array, Array]:
         """From the centre before to this joint's, in the parent's sensor; and covariance."""
@@ -97,26 +98,25 @@ def solved(
     index = index_of(Tree(swings, axes))
     mean, precision = prior_of(Tree(swings, axes), index, skeleton, priors)
     sd = 1.0 / np.sqrt(np.diag(precision))
-    groups = _soft_groups(swings)
-    give, x, blocks, weights = np.zeros(len(groups)), mean, list[Block](), list[Array]()
+    soft, x, weights = np.zeros(len(_STEPS)), mean, list[Array]()
     for count in range(_ROUNDS):
-        blocks = _all_blocks(Tree(settled(swings, give @ groups), axes), index)
+        blocks = _all_blocks(Tree(_settled(swings, soft), axes), index)
         weights = [
             block.weights(x, priors) if count else np.ones(len(block.y) // 3) for block in blocks
         ]
         more = [
-            _all_blocks(Tree(settled(swings, (give + _STEP * unit) @ groups), axes), index)
-            for unit in np.eye(len(groups))
+            _all_blocks(Tree(_settled(swings, soft + step), axes), index)
+            for step in np.diag(_STEPS)
         ]
         x, change, covariance = _stepped(
-            blocks, more, x, weights, before=(mean, precision, give), priors=priors
+            blocks, more, x, weights, before=(mean, precision, soft), priors=priors
         )
-        give = give + change
-    tree = Tree(settled(swings, give @ groups), axes)
+        soft = soft + change
+    tree = Tree(_settled(swings, soft), axes)
     residual = _residuals(_all_blocks(tree, index), x, priors)
     x = _between_axes(tree, index, x)
     covariance = covariance + priors.model_m**2 * np.eye(len(x))
-    return Chain(index, x, covariance, sd, residual, give @ groups)
+    return Chain(index, x, covariance, sd, residual, soft)
 
 
 def _between_axes(tree: Tree, index: dict[Key, int], x: Array) -> Array:
@@ -165,10 +165,10 @@ def _all_blocks(tree: Tree, index: dict[Key, int]) -> list[Block]:
     return [block for swing in tree.swings.swings for block in blocks_of(tree, swing, index)]
 
 
-def _soft_groups(swings: Swings) -> Array:
-    """Which boards lie on skin alike: those of the forearm, and all others; (group, sensor)."""
+def _settled(swings: Swings, soft: Array) -> Swings:
+    """As if boards stayed on the bone, if they are so soft."""
     forearm = np.array([place.segment == "forearm" for place in swings.layout.sensors])
-    return np.stack([forearm, ~forearm]).astype(float)
+    return settled(swings, *(np.where(forearm, *pair) for pair in soft.reshape(2, 2)))
 
 
 def _stepped(
@@ -180,19 +180,20 @@ def _stepped(
     before: tuple[Array, Array, Array],
     priors: Priors,
 ) -> tuple[Array, Array, Array]:
-    """A step of Gauss and Newton in places and in how boards give; places' covariance."""
-    mean, precision, give = before
-    count, soft = len(x), len(more)
-    normal, right = np.zeros((count + soft, count + soft)), np.zeros(count + soft)
+    """A step of Gauss and Newton in places and in how soft boards lie; places' covariance."""
+    mean, precision, soft = before
+    count, size = len(x), len(x) + len(soft)
+    normal, right = np.zeros((size, size)), np.zeros(size)
     normal[:count, :count], right[:count] = precision, precision @ (mean - x)
-    known = np.eye(soft) / priors.give**2
-    normal[count:, count:], right[count:] = known, -known @ give
+    known = np.repeat([priors.tilting, priors.lagging], 2) ** -2.0
+    normal[count:, count:], right[count:] = np.diag(known), -known * soft
     for number, (block, weight) in enumerate(zip(blocks, weights, strict=True)):
         e = block.y - block.rows @ x[block.at]
         softer = [others[number] for others in more]
-        slopes = [(e - (o.y - o.rows @ x[o.at])) / _STEP for o in softer]
+        steps = zip(softer, _STEPS, strict=True)
+        slopes = [(e - (o.y - o.rows @ x[o.at])) / step for o, step in steps]
         rows = np.column_stack([block.rows, *slopes])
-        at = np.concatenate([block.at, count + np.arange(soft)])
+        at = np.concatenate([block.at, np.arange(count, size)])
         Block(block.joint, at, rows, e, block.tilt).add_to(normal, right, weight, priors)
     step = np.linalg.solve(normal, right)
     covariance = np.linalg.inv(normal)[:count, :count]
@@ -209,4 +210,4 @@ def _residuals(blocks: list[Block], x: Array, priors: Priors) -> dict[str, float
 
 _HINGE = "ulnar_cmc"
 _ROUNDS = 3
-_STEP = 1e-3  # rad per m/s²
+_STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])  # of what is soft, to see its slopes

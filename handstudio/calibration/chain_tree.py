@@ -39,7 +39,8 @@ class Priors:
         tilt_rad: Of the attitude in a swing, and of how it drifts.
         acc_bias: Of an accelerometer [m/s²].
         noise: Of one smoothed acceleration, at least [m/s²].
-        give: How far a board on skin tilts where it is accelerated [rad per m/s²].
+        tilting: How far a board on skin tilts where it is accelerated [rad per m/s²].
+        lagging: And how far it stays behind [m per m/s²].
         model_m: What the model leaves out, of every place: skin is no straight line, axes wander.
             Chosen on virtual people so that error bars hold.
         swing_share: What else differs from swing to swing counts this much more than noise.
@@ -61,7 +62,8 @@ class Priors:
     noise: float = 0.02
     model_m: float = 0.0012
     swing_share: float = 2.0
-    give: float = 0.005
+    tilting: float = 0.005
+    lagging: float = 1e-4
 
 
 USUAL = Priors()

@@ -178,18 +178,23 @@ def smooth(
     return out
 
 
-def settled(swings: Swings, give: Float[Array, " s"]) -> Swings:
-    """The same course as if boards did not tilt where the bone beneath them is accelerated.
+def settled(swings: Swings, tilting: Float[Array, " s"], lagging: Float[Array, " s"]) -> Swings:
+    """The same course as if boards stayed on the bone that is accelerated beneath them.
+
+    A board is a mass on soft skin, far below its own frequency, so it tilts and stays behind as it
+    is accelerated. What stays behind in a movement to and fro goes further than the bone: without
+    this all arms come out long.
 
     Args:
         swings: As felt.
-        give: Tilt of every board for acceleration along it [rad per m/s²]: a board is a mass on
-            soft skin, far below its own frequency, so tilt goes with acceleration.
+        tilting: Tilt of every board for acceleration along it [rad per m/s²].
+        lagging: By how much it stays behind [m per m/s²].
     """
     moved = so3.rotate(swings.q_world_sensor, swings.acc) - [0.0, 0.0, STANDARD_GRAVITY]
     moved = so3.rotate(so3.conjugate(swings.q_world_sensor), moved)
     lean = np.stack([moved[..., 1], -moved[..., 0], np.zeros(moved.shape[:2])], axis=-1)
-    lean = lean * give[:, None]
+    lean = lean * tilting[:, None]
+    further = -lagging[:, None] * smooth(moved, swings.rate_hz, 2, _CALM_S)
     tilt, rate, more = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
     turned = so3.exp(tilt)
     return replace(
@@ -197,7 +202,7 @@ def settled(swings: Swings, give: Float[Array, " s"]) -> Swings:
         q_world_sensor=so3.multiply(swings.q_world_sensor, so3.exp(-tilt)),
         gyr=so3.rotate(turned, swings.gyr - rate),
         dgyr=so3.rotate(turned, swings.dgyr - more),
-        acc=so3.rotate(turned, swings.acc),
+        acc=so3.rotate(turned, swings.acc - further),
     )
 
 
@@ -217,7 +222,7 @@ def relative_turn(swings: Swings, joint: str) -> Float[Array, "n 3"] | None:
     return so3.log(so3.multiply(rel, so3.conjugate(flat)))
 
 
-_CALM_S = 0.19  # of accelerations that are differentiated twice
+_CALM_S = 0.25  # of accelerations that are differentiated twice
 _STILL = ("static", "flat_hand", "rest")
 
 
