@@ -32,7 +32,7 @@ from handstudio.calibration.chain_tree import (
     parent_of,
     prior_of,
 )
-from handstudio.calibration.swings import Swing, Swings, settled
+from handstudio.calibration.swings import Pushed, Swing, Swings, pushed, settled
 from handstudio.hand.skeleton import JOINTS, Skeleton
 from handstudio.maths import so3
 
@@ -98,21 +98,21 @@ def solved(
     index = index_of(Tree(swings, axes))
     mean, precision = prior_of(Tree(swings, axes), index, skeleton, priors)
     sd = 1.0 / np.sqrt(np.diag(precision))
-    soft, x, weights = np.zeros(len(_STEPS)), mean, list[Array]()
+    by, soft, x, weights = pushed(swings), np.zeros(len(_STEPS)), mean, list[Array]()
     for count in range(_ROUNDS):
-        blocks = _all_blocks(Tree(_settled(swings, soft), axes), index)
+        blocks = _all_blocks(Tree(_settled(swings, by, soft), axes), index)
         weights = [
             block.weights(x, priors) if count else np.ones(len(block.y) // 3) for block in blocks
         ]
         more = [
-            _all_blocks(Tree(_settled(swings, soft + step), axes), index)
+            _all_blocks(Tree(_settled(swings, by, soft + step), axes), index)
             for step in np.diag(_STEPS)
         ]
         x, change, covariance = _stepped(
             blocks, more, x, weights, before=(mean, precision, soft), priors=priors
         )
         soft = soft + change
-    tree = Tree(_settled(swings, soft), axes)
+    tree = Tree(_settled(swings, by, soft), axes)
     residual = _residuals(_all_blocks(tree, index), x, priors)
     x = _between_axes(tree, index, x)
     covariance = covariance + priors.model_m**2 * np.eye(len(x))
@@ -165,10 +165,10 @@ def _all_blocks(tree: Tree, index: dict[Key, int]) -> list[Block]:
     return [block for swing in tree.swings.swings for block in blocks_of(tree, swing, index)]
 
 
-def _settled(swings: Swings, soft: Array) -> Swings:
+def _settled(swings: Swings, by: Pushed, soft: Array) -> Swings:
     """As if boards stayed on the bone, if they are so soft."""
     forearm = np.array([place.segment == "forearm" for place in swings.layout.sensors])
-    return settled(swings, *(np.where(forearm, *pair) for pair in soft.reshape(2, 2)))
+    return settled(swings, by, *(np.where(forearm, *pair) for pair in soft.reshape(2, 2)))
 
 
 def _stepped(

@@ -178,7 +178,33 @@ def smooth(
     return out
 
 
-def settled(swings: Swings, tilting: Float[Array, " s"], lagging: Float[Array, " s"]) -> Swings:
+@dataclass(frozen=True, slots=True, eq=False)
+class Pushed:
+    """How the bone pushes boards on their skin; `settled` scales it.
+
+    Attributes:
+        tilt, tilt_rate, tilt_acc: Tilt in the board's axes, for one rad per m/s², and derivatives.
+        further: Acceleration by staying behind, for one m per m/s².
+    """
+
+    tilt: Float[Array, "n s 3"]
+    tilt_rate: Float[Array, "n s 3"]
+    tilt_acc: Float[Array, "n s 3"]
+    further: Float[Array, "n s 3"]
+
+
+def pushed(swings: Swings) -> Pushed:
+    """What a course's accelerations do to boards."""
+    moved = so3.rotate(swings.q_world_sensor, swings.acc) - [0.0, 0.0, STANDARD_GRAVITY]
+    moved = so3.rotate(so3.conjugate(swings.q_world_sensor), moved)
+    lean = np.stack([moved[..., 1], -moved[..., 0], np.zeros(moved.shape[:2])], axis=-1)
+    tilts = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
+    return Pushed(*tilts, -smooth(moved, swings.rate_hz, 2, _CALM_S))
+
+
+def settled(
+    swings: Swings, by: Pushed, tilting: Float[Array, " s"], lagging: Float[Array, " s"]
+) -> Swings:
     """The same course as if boards stayed on the bone that is accelerated beneath them.
 
     A board is a mass on soft skin, far below its own frequency, so it tilts and stays behind as it
@@ -187,22 +213,19 @@ def settled(swings: Swings, tilting: Float[Array, " s"], lagging: Float[Array, "
 
     Args:
         swings: As felt.
+        by: What `pushed` makes of them.
         tilting: Tilt of every board for acceleration along it [rad per m/s²].
         lagging: By how much it stays behind [m per m/s²].
     """
-    moved = so3.rotate(swings.q_world_sensor, swings.acc) - [0.0, 0.0, STANDARD_GRAVITY]
-    moved = so3.rotate(so3.conjugate(swings.q_world_sensor), moved)
-    lean = np.stack([moved[..., 1], -moved[..., 0], np.zeros(moved.shape[:2])], axis=-1)
-    lean = lean * tilting[:, None]
-    further = -lagging[:, None] * smooth(moved, swings.rate_hz, 2, _CALM_S)
-    tilt, rate, more = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
+    share = tilting[:, None]
+    tilt = share * by.tilt
     turned = so3.exp(tilt)
     return replace(
         swings,
-        q_world_sensor=so3.multiply(swings.q_world_sensor, so3.exp(-tilt)),
-        gyr=so3.rotate(turned, swings.gyr - rate),
-        dgyr=so3.rotate(turned, swings.dgyr - more),
-        acc=so3.rotate(turned, swings.acc - further),
+        q_world_sensor=so3.multiply(swings.q_world_sensor, so3.conjugate(turned)),
+        gyr=so3.rotate(turned, swings.gyr - share * by.tilt_rate),
+        dgyr=so3.rotate(turned, swings.dgyr - share * by.tilt_acc),
+        acc=so3.rotate(turned, swings.acc - lagging[:, None] * by.further),
     )
 
 
