@@ -168,7 +168,8 @@ def _all_blocks(tree: Tree, index: dict[Key, int]) -> list[Block]:
 def _settled(swings: Swings, by: Pushed, soft: Array) -> Swings:
     """As if boards stayed on the bone, if they are so soft."""
     forearm = np.array([place.segment == "forearm" for place in swings.layout.sensors])
-    return settled(swings, by, *(np.where(forearm, *pair) for pair in soft.reshape(2, 2)))
+    tilting, lagging = (np.where(forearm, there, else_) for there, else_ in soft.reshape(2, 2))
+    return settled(swings, by, tilting, lagging)
 
 
 def _stepped(

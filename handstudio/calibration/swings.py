@@ -198,8 +198,8 @@ def pushed(swings: Swings) -> Pushed:
     moved = so3.rotate(swings.q_world_sensor, swings.acc) - [0.0, 0.0, STANDARD_GRAVITY]
     moved = so3.rotate(so3.conjugate(swings.q_world_sensor), moved)
     lean = np.stack([moved[..., 1], -moved[..., 0], np.zeros(moved.shape[:2])], axis=-1)
-    tilts = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
-    return Pushed(*tilts, -smooth(moved, swings.rate_hz, 2, _CALM_S))
+    tilt, rate, more = (smooth(lean, swings.rate_hz, k, _CALM_S) for k in (0, 1, 2))
+    return Pushed(tilt, rate, more, -smooth(moved, swings.rate_hz, 2, _CALM_S))
 
 
 def settled(
