@@ -41,6 +41,7 @@ from handstudio.device.orders import (
     SetHeading,
     SetSensors,
     SetSubject,
+    SetTracker,
     ShareSamples,
     StartTake,
     StopTake,
@@ -59,8 +60,9 @@ from handstudio.protocol.packets import (
     Restart,
     Result,
 )
-from handstudio.recording.header import Header
+from handstudio.recording.header import Header, with_tracker
 from handstudio.recording.take import FirstState, pack_first_state
+from handstudio.recording.tracker_message import TrackerFacts
 from handstudio.samples import Event, ImuSamples, Ranges
 from handstudio.setup import HandModel, Setup, for_device
 from handstudio.stream import EventStream
@@ -97,6 +99,7 @@ class Capture:
         self._wanted: _Wanted | None = None
         self._known = Known()
         self._waiting: Known | None = None  # what is known since the take began
+        self._tracker: TrackerFacts | None = None
         self._line: Line | None = None
         self._stream = EventStream("handstudio-1", None)
         self._state: pipeline.State | None = None
@@ -112,6 +115,10 @@ class Capture:
     def send(self, order: Order) -> None:
         """Ask for something; returns at once."""
         self._orders.put(order)
+
+    def recorder(self) -> Recorder | None:
+        """The take that is on."""
+        return self.newest.recorder
 
     def drain(self) -> list[Motion]:
         """The motions since the last call, oldest first; for one reader."""
@@ -194,6 +201,8 @@ class Capture:
                 self._learn(replace(self._newly_known, sensors=errors))
             case SetFilter(filter=chosen):
                 self._learn(replace(self._newly_known, filter=chosen))
+            case SetTracker(facts=facts):
+                self._tracker = facts
             case SetHeading(headings=headings):
                 self._turn_to(headings)
             case ResetHeading(sensor=sensor):
@@ -572,6 +581,7 @@ class Capture:
         header = Header(
             order.path.stem, order.subject, now_ns(), setup, "wire", self.newest.address
         )
+        header = with_tracker(header, self._tracker)
         try:
             recorder = Recorder(order.path, header, pack_first_state(first))
         except HandstudioError as error:

@@ -15,6 +15,7 @@ from handstudio.errors import HandstudioError
 from handstudio.health.findings import Finding
 from handstudio.pipeline import Motion
 from handstudio.protocol.packets import Description, Reply
+from handstudio.recording.tracker_message import TrackerFacts
 from handstudio.setup import AnyFilter, HandModel, Setup
 
 
@@ -78,6 +79,16 @@ class SetFilter:
 
 
 @dataclass(frozen=True, slots=True)
+class SetTracker:
+    """The tracker whose poses go into takes that begin from now on; None: none.
+
+    A take that is on keeps the one that it began with.
+    """
+
+    facts: TrackerFacts | None
+
+
+@dataclass(frozen=True, slots=True)
 class StartTake:
     """Record from now on."""
 
@@ -133,6 +144,7 @@ Order: TypeAlias = (
     | SetSubject
     | SetSensors
     | SetFilter
+    | SetTracker
     | StartTake
     | StopTake
     | Ask
