@@ -169,7 +169,8 @@ def record(
         capture.send(StopTake())
         capture.stop()
         if reader is not None:
-            reader.stop()
+            reader.end()
+            reader.join()
     _raise_what_failed(capture)
     return _tell_take(open_take(path), json)
 

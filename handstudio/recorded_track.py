@@ -54,8 +54,13 @@ def on_axis(
 ) -> Track:
     """Poses with the times when they were told on the device's axis, rising."""
     told = clock.told_us(poses.arrival_ns // 1000, poses.own_us) - host_minus_device_us
-    rising = np.maximum.accumulate(told) if len(told) else told
-    return Track(name, rising, poses.t_room_terminal, poses.q_room_terminal, poses.quality)
+    return Track(name, rising(told), poses.t_room_terminal, poses.q_room_terminal, poses.quality)
+
+
+def rising(time_us: Int64[Array, " n"]) -> Int64[Array, " n"]:
+    """The same times, none before or at the one before it."""
+    step = np.arange(len(time_us))
+    return np.maximum.accumulate(time_us - step) + step if len(time_us) else time_us
 
 
 def _offsets(take: Take, time_us: Array) -> tuple[list[int], list[int]]:

@@ -47,12 +47,16 @@ from handstudio.trackers.track import Track
 WITHIN_S = 10.0
 """How far a tracker's clock may begin from the take's first instant, unless told."""
 
-_BELIEVED_SD_M = 0.05  # a place that is known worse is none
-_FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
+BELIEVED_SD_M = 0.05
+"""A place that is known worse is none."""
+
+TOLD_S = (-0.5, 1.5)
+"""How late what comes along with the bytes may be: the clock is the host's."""
+
+FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
 _ALIKE_RAD = 0.005
 _LEVER_SD_M = 0.03
-_TOLD_S = (-0.5, 1.5)  # how late what was recorded with the take may be: the clock is the host's
-_AGAIN_S = (-0.1, 0.1)  # a kept track is aligned already; another setup may shift it a little
+AGAIN_S = (-0.1, 0.1)  # a kept track is aligned already; another setup may shift it a little
 _STEP = 2048
 _BAD = int(Doubt.UNPLACED | Doubt.SILENT)
 
@@ -146,12 +150,12 @@ def _aligned(
             sensor=sensor,
             known=", ".join(names),
         )
-    found, best = _best(setup, motion, track, sensor, search_s)
+    found, best = best_sensor(setup, motion, track, sensor, search_s)
     offset_us = round(found.delay_s * 1e6)
     track = replace(track, time_us=track.time_us - offset_us)
     sd = 0.0
     if lever_m is None:
-        filter = _filter(replace(found, delay_s=0.0), None)
+        filter = filter_of(replace(found, delay_s=0.0), None)
         felt = _felt(take, setup, motion, names.index(best))
         _placed, state = late_root.run(filter, late_root.begin(filter), felt, track)
         lever_m = tuple(state.lever.tolist())
@@ -227,7 +231,7 @@ def _as_recorded(take: Take, setup: Setup, motion: Motion) -> KeptTrack:
         source=facts.source,
         sensor=facts.sensor or None,
         lever_m=facts.lever_m,
-        search_s=_TOLD_S,
+        search_s=TOLD_S,
     )
 
 
@@ -240,16 +244,16 @@ def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root
             sensor=kept.facts.sensor,
         )
     k = names.index(kept.facts.sensor)
-    found = align(*_attitudes(setup, motion, k), kept.track, _AGAIN_S)
-    filter = _filter(found, kept.facts.t_sensor_terminal)
+    found = align(*_attitudes(setup, motion, k), kept.track, AGAIN_S)
+    filter = filter_of(found, kept.facts.t_sensor_terminal)
     felt = _felt(take, setup, motion, k)
     placed, _ = late_root.run(filter, late_root.begin(filter), felt, kept.track)
-    believed = placed.sd_m <= _BELIEVED_SD_M
+    believed = placed.sd_m <= BELIEVED_SD_M
     q_room_world = np.where(believed[:, None], placed.q_room_world, np.nan)
     t_room_sensor = np.where(believed[:, None], placed.t_room_sensor, np.nan)
     t_room_elbow = np.concatenate(
         [
-            _elbow(setup, motion[at : at + _STEP], k, t_room_sensor[at:][:_STEP], q_at)
+            elbow_of(setup, motion[at : at + _STEP], k, t_room_sensor[at:][:_STEP], q_at)
             for at in range(0, len(motion), _STEP)
             for q_at in [q_room_world[at : at + _STEP]]
         ]
@@ -267,7 +271,7 @@ def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root
     )
 
 
-def _elbow(
+def elbow_of(
     setup: Setup, motion: Motion, k: int, t_room_sensor: Array, q_room_world: Array
 ) -> Array:
     """From a sensor to its segment's joint, and from there along the bones."""
@@ -281,17 +285,17 @@ def _elbow(
 
 def _attitudes(setup: Setup, motion: Motion, k: int) -> tuple[Array, Array]:
     placed = (motion.doubt[:, k] & _BAD) == 0
-    return np.array(motion.time_us[placed]), _in_time(setup, motion.q_world_sensor[:, k])[placed]
+    return np.array(motion.time_us[placed]), in_time(setup, motion.q_world_sensor[:, k])[placed]
 
 
-def _in_time(setup: Setup, q: Array) -> Array:
+def in_time(setup: Setup, q: Array) -> Array:
     """Attitudes of the instants they are said to be of.
 
     VQF adds the newest rate for the whole interval that it ends, so it is half an interval ahead
     where rates are of an instant; at 10 rad/s and 100 Hz that is 3 degrees.
     """
     q = np.array(q)
-    if not isinstance(setup.filter, VqfFilter) or setup.mean_rates or len(q) < 2:
+    if is_in_time(setup) or len(q) < 2:
         return q
     before, now = q[:-1], q[1:]
     near = np.sum(before * now, axis=-1, keepdims=True) < 0.0
@@ -299,7 +303,12 @@ def _in_time(setup: Setup, q: Array) -> Array:
     return q
 
 
-def _best(
+def is_in_time(setup: Setup) -> bool:
+    """Whether the filter's attitudes are of their instants as they come."""
+    return not isinstance(setup.filter, VqfFilter) or setup.mean_rates
+
+
+def best_sensor(
     setup: Setup,
     motion: Motion,
     track: Track,
@@ -314,13 +323,13 @@ def _best(
     first = [] if wanted is None else [wanted]
     refused: CalibrationError | None = None
     for name in [*first, *(n for n in names if n not in first)]:
-        if wanted in found and found[wanted].residual_rad <= _FIXED_RAD:
+        if wanted in found and found[wanted].residual_rad <= FIXED_RAD:
             break
         try:
             found[name] = align(*_attitudes(setup, motion, names.index(name)), track, search_s)
             if len(found) == 1:
                 clock_s = found[name].delay_s
-                search_s = clock_s + _AGAIN_S[0], clock_s + _AGAIN_S[1]
+                search_s = clock_s + AGAIN_S[0], clock_s + AGAIN_S[1]
         except CalibrationError as error:
             refused = refused or error
     if not found:
@@ -333,7 +342,7 @@ def _best(
         key=lambda name: _depth(setup, name),
     )
     chosen = wanted or best
-    if chosen not in found or found[chosen].residual_rad > _FIXED_RAD:
+    if chosen not in found or found[chosen].residual_rad > FIXED_RAD:
         raise CalibrationError(
             "The terminal {terminal} does not stay with {sensor}; of all it stays best with "
             "{best}, within {degrees:.1f} deg.",
@@ -352,7 +361,8 @@ def _depth(setup: Setup, sensor: str) -> int:
     return SEGMENTS.index(segment) if segment in SEGMENTS else len(SEGMENTS)
 
 
-def _filter(found: Alignment, lever: tuple[float, float, float] | None) -> RootFilter:
+def filter_of(found: Alignment, lever: tuple[float, float, float] | None) -> RootFilter:
+    """The filter that goes on from an alignment; a lever that is not known is estimated."""
     sd = _LEVER_SD_M if lever is None else 0.0
     like = RootFilter(t_sensor_terminal=lever or (0.0, 0.0, 0.0), lever_sd=sd, delay_sd=0.01)
     return late_root.filter_for(found, like)
@@ -365,7 +375,7 @@ def _felt(take: Take, setup: Setup, motion: Motion, k: int) -> Felt:
         sound = run if setup.sensors is None else corrected(run, setup.sensors, setup.layout.names)
         acc.append(sound.acc[:, k])
     known = (motion.doubt[:, k] & _BAD) == 0
-    time_us, q = np.array(motion.time_us), _in_time(setup, motion.q_world_sensor[:, k])
+    time_us, q = np.array(motion.time_us), in_time(setup, motion.q_world_sensor[:, k])
     return Felt(time_us, q, np.concatenate(acc), known)
 
 

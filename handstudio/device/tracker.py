@@ -26,6 +26,7 @@ LSL = "lsl:"
 SILENT_S = 1.0
 """Without a word from it for so long a tracker counts as gone."""
 
+_FIND_S = 2.0
 _READ_S = 0.1
 _RETRY_S = 1.0
 _FROZEN = 30  # poses that are the same to the last bit: a tracker that rests still has noise
@@ -105,9 +106,12 @@ class TrackerReader:
         """What came since the last call, oldest first; for one reader."""
         return [self._poses.popleft() for _ in range(len(self._poses))]
 
-    def stop(self) -> None:
-        """Let go of the line; returns when that is done."""
+    def end(self) -> None:
+        """Let go of the line; returns at once."""
         self._ended.set()
+
+    def join(self) -> None:
+        """Wait until the thread has ended."""
         if self._thread.is_alive():
             self._thread.join()
 
@@ -128,7 +132,7 @@ class TrackerReader:
             self._ended.wait(_RETRY_S)
 
     def _read_on(self) -> None:
-        line = LslTracker(self.newest.facts.source.removeprefix(LSL))
+        line = LslTracker(self.newest.facts.source.removeprefix(LSL), _FIND_S)
         heard = time.monotonic()
         try:
             while not self._ended.is_set():

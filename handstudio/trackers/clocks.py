@@ -18,7 +18,7 @@ FIRST = 120
 """So many poses decide; until then there are no times."""
 
 _SAME_US = 2_000_000  # a clock that is nearer is the host's, and what is between them is delay
-_PACE = 0.02  # a clock that goes faster or slower by more is none
+_PACE = 0.2  # what goes faster or slower by more is no clock; arrivals are uneven, come in bursts
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,10 @@ def clock_of(arrival_us: Int64[Array, " n"], own_us: Int64[Array, " n"]) -> Trac
     if len(arrival_us) < FIRST:
         return None
     arrival, own = arrival_us[:FIRST], own_us[:FIRST]
-    took = max(int(arrival[-1] - arrival[0]), 1)
-    pace = (own[-1] - own[0]) / took
-    if np.mean(np.diff(own) > 0) < 0.9 or abs(pace - 1.0) > _PACE + 100_000 / took:
+    half = FIRST // 2
+    took = np.maximum(arrival[half:] - arrival[:-half], 1)
+    pace = float(np.median((own[half:] - own[:-half]) / took))
+    if np.mean(np.diff(own) > 0) < 0.9 or abs(pace - 1.0) > _PACE:
         return TrackerClock(sound=False)
     late = arrival - own
     # of another origin: the least delayed of the first tells where it begins

@@ -40,6 +40,12 @@ def test_without_a_clock_arrivals_count(arrival, own):
     np.testing.assert_array_equal(clock.told_us(came, own), came)
 
 
+def test_poses_that_come_in_a_burst_at_first_have_a_clock(arrival):
+    even, came = arrival
+    came = np.maximum(came, came[25])
+    assert clock_of(came, even).sound
+
+
 def test_a_clock_that_jumps_is_not_followed(arrival):
     even, came = arrival
     own = even.copy()
