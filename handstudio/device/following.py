@@ -23,10 +23,11 @@ from handstudio.health.clock import ClockEstimate
 from handstudio.pipeline import Doubt
 from handstudio.recorded_track import on_axis, rising
 from handstudio.recording.tracker_message import Poses, TrackerFacts, joined
-from handstudio.rooted import BELIEVED_SD_M, TOLD_S, best_sensor, elbow_of, filter_of
+from handstudio.rooted import AGAIN_S, BELIEVED_SD_M, TOLD_S, best_sensor, elbow_of, filter_of
 from handstudio.setup import Setup
 from handstudio.trackers import late_root
 from handstudio.trackers.clocks import FIRST, TrackerClock, clock_of
+from handstudio.trackers.late_align import Alignment
 from handstudio.trackers.late_faults import Fate
 from handstudio.trackers.late_root import Felt, RootFilter, RootState
 from handstudio.trackers.track import Track
@@ -35,6 +36,8 @@ LEAST_S = 6.0
 """Before so much motion was seen nothing is aligned."""
 
 _AGAIN_S = 1.5  # between two tries
+_BETTER_S, _BETTER = 8.0, 0.9  # so often it is aligned anew, and that is used where it is so good
+_WARM_S = 6.0  # the filter then goes through so much again
 _TRUSTED_RAD = 0.05  # attitudes that agree no better may be of a motion that was too small yet
 _RECENT = 60  # poses: a second, of which faults are told
 _LOST = 300  # poses in a row that do not fit: it is sought anew
@@ -103,6 +106,7 @@ class Following:
     _tracks: deque[Track] = field(default_factory=deque)
     _axis_us: int | None = None
     _tried_us: int = 0
+    _found: Alignment | None = None
     _filter: RootFilter | None = None
     _state: RootState | None = None
     _fates: deque[int] = field(default_factory=lambda: deque(maxlen=_LOST))
@@ -127,6 +131,8 @@ class Following:
             return self.newest
         if self._state is not None:
             self._follow([part], track)
+            if self._state is not None:
+                self._look_again()
         elif self._moves.setup.layout.is_hand and self._tracks:
             self._look()
         return self.newest
@@ -194,8 +200,7 @@ class Following:
             return
         if found.residual_rad > _TRUSTED_RAD and seconds < 0.8 * SPAN_S:
             return
-        self._filter = filter_of(found, self.facts.lever_m)
-        self._state = late_root.begin(self._filter)
+        self._begin(found)
         self.newest = RootNow(
             RootPhase.FOLLOWING,
             sensor=sensor,
@@ -204,6 +209,35 @@ class Following:
             delay_s=found.delay_s,
         )
         self._follow([whole], track)
+
+    def _begin(self, found: Alignment) -> None:
+        self._found, self._filter = found, filter_of(found, self.facts.lever_m)
+        self._state = late_root.begin(self._filter)
+
+    def _look_again(self) -> None:
+        """Align by what came since, and begin from there where it is known better by that.
+
+        The first alignment is often of seconds in which headings still settled; how the world lies
+        in the room, gravity above all, is nothing that the filter mends.
+        """
+        setup, before = self._moves.setup, self._found
+        assert setup is not None and self._axis_us is not None  # noqa: PT018 - it was found
+        assert before is not None
+        if self._axis_us - self._tried_us < _BETTER_S * 1e6:
+            return
+        self._tried_us = self._axis_us
+        whole, track = self._moves.whole(), _joined(self._tracks)
+        in_time = msgspec.structs.replace(setup, mean_rates=True)
+        late = before.delay_s + AGAIN_S[0], before.delay_s + AGAIN_S[1]
+        try:
+            found, _ = best_sensor(in_time, whole.motion, track, self.newest.sensor, late)
+        except CalibrationError:
+            return  # it rests: what is known is known
+        if found.doubt < _BETTER * before.doubt:
+            self._begin(found)
+            last = whole.last(_WARM_S)
+            since = np.searchsorted(track.time_us, last.motion.time_us[0])
+            self._follow([last], track[since:])
 
     # --- following --------------------------------------------------------------------------------
 
@@ -222,7 +256,11 @@ class Following:
         self._fates.extend(placed.fates.tolist())
         if len(motion):
             self._place(part, k, placed, state.delay_s)
-        if len(self._fates) == _LOST and all(f in _ASTRAY for f in self._fates):
+        if (
+            len(self._fates) == _LOST
+            and self._state is not None
+            and all(f in _ASTRAY for f in self._fates)
+        ):
             self._begin_anew()
 
     def _place(self, part: Part, k: int, placed: late_root.Placed, delay_s: float) -> None:

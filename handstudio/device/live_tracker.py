@@ -16,7 +16,7 @@ from handstudio.device.tracker import TrackerNow, TrackerReader
 from handstudio.errors import HandstudioError
 from handstudio.recording.tracker_message import TrackerFacts
 
-_STEP_S = 0.01
+_STEP_S = 0.02
 _PLACES = 4000  # kept for `drain`
 
 

@@ -26,6 +26,12 @@ class Part:
     motion: Motion
     acc: Array
 
+    def last(self, seconds: float) -> Part:
+        """The end of it."""
+        time_us = self.motion.time_us
+        at = int(np.searchsorted(time_us, time_us[-1] - round(seconds * 1e6)))
+        return Part(self.motion[at:], self.acc[at:])
+
 
 @dataclass(slots=True)
 class Moves:
