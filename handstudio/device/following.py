@@ -70,7 +70,6 @@ class RootNow:
         t_room_elbow: [m].
         q_room_world: What takes the motion's attitudes into the room.
         sd_m: How sure the place of the sensor is; the place is the last that was sure enough.
-        began: Elbow and attitude of the world when it was found: where a picture may begin.
     """
 
     phase: RootPhase = RootPhase.WAITING
@@ -85,7 +84,6 @@ class RootNow:
     t_room_elbow: Float[Array, "3"] | None = None
     q_room_world: Float[Array, "4"] | None = None
     sd_m: float = np.inf
-    began: tuple[Float[Array, "3"], Float[Array, "4"]] | None = None
 
 
 @dataclass(slots=True)
@@ -139,21 +137,21 @@ class Following:
 
     def _of_one_axis(self, moves: list[Moved]) -> list[Moved]:
         """Only what is of the newest setup and time axis; what was of others is forgotten."""
-        moves = [move for move in moves if len(move.motion)]
-        if not moves:
-            return moves
-        setup = moves[-1].setup
-        since = max((k + 1 for k, move in enumerate(moves) if move.setup != setup), default=0)
-        moves = moves[since:]
-        first = int(moves[0].motion.time_us[0])
-        ahead = first - (self._axis_us if self._axis_us is not None else first - 1)
-        known = self._moves.setup
-        if not 0 < ahead < _JUMP_US or (known is not None and known != setup):
-            self._moves.forget()
-            self._begin_anew()
-            self._clock = ClockEstimate()
-        self._axis_us = int(moves[-1].motion.time_us[-1])
-        return moves
+        mine = list[Moved]()
+        for move in moves:
+            if not len(move.motion):
+                continue
+            known, first_us = self._moves.setup, int(move.motion.time_us[0])
+            known = mine[-1].setup if mine else known
+            goes_on = self._axis_us is not None and 0 < first_us - self._axis_us < _JUMP_US
+            if known is not None and not (goes_on and move.setup == known):
+                mine.clear()
+                self._moves.forget()
+                self._clock = ClockEstimate()
+                self._begin_anew()
+            mine.append(move)
+            self._axis_us = int(move.motion.time_us[-1])
+        return mine
 
     def _begin_anew(self) -> None:
         self._state = self._filter = None
@@ -272,9 +270,8 @@ class Following:
         if sd_m <= BELIEVED_SD_M:
             t, q = placed.t_room_sensor[-1:], placed.q_room_world[-1:]
             elbow = elbow_of(setup, last, k, t, q)[0]
-            began = now.began or (elbow, q[0])
             at = int(last.time_us[0])
-            now = replace(now, time_us=at, t_room_elbow=elbow, q_room_world=q[0], began=began)
+            now = replace(now, time_us=at, t_room_elbow=elbow, q_room_world=q[0])
         self.newest = now
 
     def _trouble(self) -> Fate | None:
