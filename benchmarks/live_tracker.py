@@ -181,10 +181,11 @@ def compare(rehearsed: Rehearsed, segment: str, got: Recorded) -> dict[str, Any]
     """RMS [mm] of the joint the segment begins at, live and of the processed take."""
     take = open_take(got.take)
     setup, motion = take.header.setup, process(take)
-    truth = _truth(rehearsed, int(motion.time_us[-1]) - began_us(take))
+    since_us = motion.time_us - began_us(take)
+    truth = _truth(rehearsed, int(since_us[-1]) + _PERIOD_US)
     standing = standing_of(rehearsed.seed)
     joint = SEGMENTS.index(segment)
-    at = np.searchsorted(truth.time_us + began_us(take), motion.time_us)
+    at = np.rint(since_us / _PERIOD_US).astype(np.int64)
     true = standing.t_room_world + so3.rotate(standing.q_room_world, truth.t_world_joint[at, joint])
     root = root_or_why(take, setup, motion)
     if not isinstance(root, Root):

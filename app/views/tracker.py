@@ -47,7 +47,7 @@ def _place(now: LiveNow) -> list[str]:
             return [_("It is there; the glove's motion is waited for.")]
         case RootPhase.LOOKING:
             looking = _("**Looking for its motion**: turn hand and forearm about. {seconds:.0f} s")
-            why = [] if root.why is None else _problem(root.why)
+            why = [] if root.why is None or root.seconds < _LONG_S else _problem(root.why)
             return [looking.format(seconds=root.seconds), *why]
         case RootPhase.FOLLOWING:
             return [*_following(root)]
@@ -70,6 +70,7 @@ def _following(root: RootNow) -> list[str]:
 
 
 _FAR_M = 0.05
+_LONG_S = 12.0  # so long it may take with nothing amiss
 
 
 def _take(state: State) -> list[str]:

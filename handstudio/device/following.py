@@ -35,7 +35,7 @@ from handstudio.trackers.track import Track
 LEAST_S = 6.0
 """Before so much motion was seen nothing is aligned."""
 
-_AGAIN_S = 1.5  # between two tries
+_AGAIN_S = 1.5, 8.0  # between two tries, at first and at most: each costs as much as a second
 _BETTER_S, _BETTER = 8.0, 0.9  # so often it is aligned anew, and that is used where it is so good
 _WARM_S = 6.0  # the filter then goes through so much again
 _TRUSTED_RAD = 0.05  # attitudes that agree no better may be of a motion that was too small yet
@@ -104,6 +104,7 @@ class Following:
     _tracks: deque[Track] = field(default_factory=deque)
     _axis_us: int | None = None
     _tried_us: int = 0
+    _again_s: float = _AGAIN_S[0]
     _found: Alignment | None = None
     _filter: RootFilter | None = None
     _state: RootState | None = None
@@ -155,6 +156,7 @@ class Following:
 
     def _begin_anew(self) -> None:
         self._state = self._filter = None
+        self._again_s = _AGAIN_S[0]
         self._fates.clear()
         self._tracks.clear()
         self.newest = RootNow()
@@ -185,9 +187,9 @@ class Following:
         assert setup is not None and self._axis_us is not None  # noqa: PT018 - motion came
         seconds = min(self._moves.seconds, float(np.ptp(track.time_us)) * 1e-6)
         self.newest = replace(self.newest, phase=RootPhase.LOOKING, seconds=seconds)
-        if seconds < LEAST_S or self._axis_us - self._tried_us < _AGAIN_S * 1e6:
+        if seconds < LEAST_S or self._axis_us - self._tried_us < self._again_s * 1e6:
             return
-        self._tried_us = self._axis_us
+        self._tried_us, self._again_s = self._axis_us, min(2.0 * self._again_s, _AGAIN_S[1])
         whole = self._moves.whole()
         in_time = msgspec.structs.replace(setup, mean_rates=True)  # `Moves` has seen to it
         try:

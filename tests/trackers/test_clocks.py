@@ -32,7 +32,10 @@ def test_a_clock_of_another_origin_begins_where_the_least_delayed_pose_came(arri
     assert abs(int((told - even)[0])) < 1500
 
 
-@pytest.mark.parametrize("own", [np.zeros(300, int), np.arange(300), np.arange(300) * -16_667])
+@pytest.mark.parametrize(
+    "own",
+    [np.zeros(300, int), HOST_US + np.zeros(300, int), np.arange(300), np.arange(300) * -16_667],
+)
 def test_without_a_clock_arrivals_count(arrival, own):
     _, came = arrival
     clock = clock_of(came, own)
@@ -42,8 +45,8 @@ def test_without_a_clock_arrivals_count(arrival, own):
 
 def test_poses_that_come_in_a_burst_at_first_have_a_clock(arrival):
     even, came = arrival
-    came = np.maximum(came, came[25])
-    assert clock_of(came, even).sound
+    assert clock_of(np.maximum(came, came[25]), even - HOST_US).sound
+    assert clock_of(np.maximum(came, came[110]), even).sound
 
 
 def test_a_clock_that_jumps_is_not_followed(arrival):
