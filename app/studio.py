@@ -409,11 +409,8 @@ class Studio:
     def _choose_tracker(self, chosen: intents.ChooseTracker) -> None:
         """The virtual one streams with the virtual glove, which begins anew for it."""
         newest = self.state.newest
-        last = self.store.settings.last_address
-        other = chosen.source != self.store.settings.tracker
-        with_it = with_tracker(last, chosen.source) if other else newest.address
         here = is_virtual(newest.address) and newest.phase is not Phase.FAILED
-        anew = here and other and with_it not in (newest.address, last)
+        anew = here and with_tracker(newest.address, chosen.source) != newest.address
         if anew and newest.recorder is not None:
             raise HandstudioError(
                 "The virtual glove begins anew with its tracker, and a take is on.",
@@ -425,7 +422,7 @@ class Studio:
             tracker_sensor=chosen.sensor,
         )
         if anew:
-            self._connect(last)
+            self._connect(newest.address)
 
     def _find(self) -> None:
         newest = self.state.newest
