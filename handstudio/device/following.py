@@ -35,7 +35,8 @@ from handstudio.trackers.track import Track
 LEAST_S = 6.0
 """Before so much motion was seen nothing is aligned."""
 
-_AGAIN_S = 1.5, 8.0  # between two tries, at first and at most: each costs as much as a second
+_AGAIN_S = 1.5, 8.0  # between two tries, at first and after so long: a try may take half a second
+_LONG_S = 15.0
 _BETTER_S, _BETTER = 8.0, 0.9  # so often it is aligned anew, and that is used where it is so good
 _WARM_S = 6.0  # the filter then goes through so much again
 _TRUSTED_RAD = 0.05  # attitudes that agree no better may be of a motion that was too small yet
@@ -104,7 +105,6 @@ class Following:
     _tracks: deque[Track] = field(default_factory=deque)
     _axis_us: int | None = None
     _tried_us: int = 0
-    _again_s: float = _AGAIN_S[0]
     _found: Alignment | None = None
     _filter: RootFilter | None = None
     _state: RootState | None = None
@@ -156,7 +156,6 @@ class Following:
 
     def _begin_anew(self) -> None:
         self._state = self._filter = None
-        self._again_s = _AGAIN_S[0]
         self._fates.clear()
         self._tracks.clear()
         self.newest = RootNow()
@@ -187,9 +186,10 @@ class Following:
         assert setup is not None and self._axis_us is not None  # noqa: PT018 - motion came
         seconds = min(self._moves.seconds, float(np.ptp(track.time_us)) * 1e-6)
         self.newest = replace(self.newest, phase=RootPhase.LOOKING, seconds=seconds)
-        if seconds < LEAST_S or self._axis_us - self._tried_us < self._again_s * 1e6:
+        pause_s = _AGAIN_S[0] if seconds < _LONG_S else _AGAIN_S[1]
+        if seconds < LEAST_S or self._axis_us - self._tried_us < pause_s * 1e6:
             return
-        self._tried_us, self._again_s = self._axis_us, min(2.0 * self._again_s, _AGAIN_S[1])
+        self._tried_us = self._axis_us
         whole = self._moves.whole()
         in_time = msgspec.structs.replace(setup, mean_rates=True)  # `Moves` has seen to it
         try:
