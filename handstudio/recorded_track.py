@@ -1,24 +1,48 @@
 """The poses that were recorded with a take, on the time axis of its motion.
 
-Bytes of the device have arrivals too, so that the least delayed of the last seconds tell how the
-device's clock stands to the host's; the delays that remain, of the tracker and of the bytes, are
-one number, which alignment finds.
+Bytes of the device have arrivals too, so that the least delayed tell how the device's clock stands
+to the host's; the delays that remain, of the tracker and of the bytes, are one number, which
+alignment finds.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int64
 
 from handstudio.arrays import Array
-from handstudio.health.clock import ClockEstimate
 from handstudio.recording.take import Take
 from handstudio.recording.tracker_message import Poses
 from handstudio.samples import ImuSamples
 from handstudio.trackers.clocks import TrackerClock, clock_of
 from handstudio.trackers.track import Track
+
+_DRIFT = 1e-4  # of clocks that are sound; a busy host's delays grow faster, and are not followed
+
+
+@dataclass(slots=True)
+class LeastDelayed:
+    """Host minus device time by the least delayed arrivals, as far as clocks may drift.
+
+    A minimum over some seconds would step by what a busy machine delays all that comes in them.
+
+    Attributes:
+        offset_us: None before the first arrival.
+    """
+
+    offset_us: float | None = None
+    _device_us: int = 0
+
+    def observe(self, device_us: int, arrival_ns: int) -> None:
+        """The newest instant in a chunk and when the chunk arrived."""
+        difference = arrival_ns / 1000 - device_us
+        if self.offset_us is not None:
+            slack = _DRIFT * (device_us - self._device_us)
+            difference = min(difference, self.offset_us + slack)
+        self.offset_us, self._device_us = difference, device_us
 
 
 def recorded_track(take: Take, time_us: Int64[Array, " n"]) -> Track | None:
@@ -65,7 +89,7 @@ def rising(time_us: Int64[Array, " n"]) -> Int64[Array, " n"]:
 
 def _offsets(take: Take, time_us: Array) -> tuple[list[int], list[int]]:
     """Host minus device time [µs] after every arrival of an instant [ns]."""
-    clock, count = ClockEstimate(), 0
+    clock, count = LeastDelayed(), 0
     arrivals, offsets = list[int](), list[int]()
     for arrival_ns, _packets, events in take.decoded():
         fresh = sum(len(event) for event in events if isinstance(event, ImuSamples))
@@ -73,8 +97,7 @@ def _offsets(take: Take, time_us: Array) -> tuple[list[int], list[int]]:
         if not fresh or arrival_ns is None or count > len(time_us):
             continue
         clock.observe(int(time_us[count - 1]), arrival_ns)
-        offset_ns = clock.offset_ns()
-        assert offset_ns is not None  # one was observed
+        assert clock.offset_us is not None  # one was observed
         arrivals.append(arrival_ns)
-        offsets.append(offset_ns // 1000)
+        offsets.append(round(clock.offset_us))
     return arrivals, offsets

@@ -19,9 +19,8 @@ from handstudio.arrays import Array
 from handstudio.device.moves import SPAN_S, Moves, Part
 from handstudio.device.orders import Moved
 from handstudio.errors import CalibrationError
-from handstudio.health.clock import ClockEstimate
 from handstudio.pipeline import Doubt
-from handstudio.recorded_track import on_axis, rising
+from handstudio.recorded_track import LeastDelayed, on_axis, rising
 from handstudio.recording.tracker_message import Poses, TrackerFacts, joined
 from handstudio.rooted import AGAIN_S, BELIEVED_SD_M, TOLD_S, best_sensor, elbow_of, filter_of
 from handstudio.setup import Setup
@@ -99,7 +98,7 @@ class Following:
     facts: TrackerFacts
     newest: RootNow = RootNow()
     _moves: Moves = field(default_factory=Moves)
-    _clock: ClockEstimate = field(default_factory=ClockEstimate)
+    _clock: LeastDelayed = field(default_factory=LeastDelayed)
     _told: TrackerClock | None = None
     _waiting: list[Poses] = field(default_factory=list)  # until both clocks are known
     _tracks: deque[Track] = field(default_factory=deque)
@@ -148,7 +147,7 @@ class Following:
             if known is not None and not (goes_on and move.setup == known):
                 mine.clear()
                 self._moves.forget()
-                self._clock = ClockEstimate()
+                self._clock = LeastDelayed()
                 self._begin_anew()
             mine.append(move)
             self._axis_us = int(move.motion.time_us[-1])
@@ -166,11 +165,10 @@ class Following:
             waiting = joined(self._waiting)
             self._told = clock_of(waiting.arrival_ns // 1000, waiting.own_us)
             self._waiting = [waiting[-4 * FIRST :]]
-        offset_ns = self._clock.offset_ns()
-        if self._told is None or offset_ns is None or not self._waiting:
+        if self._told is None or self._clock.offset_us is None or not self._waiting:
             return None
         poses, self._waiting = joined(self._waiting), []
-        offset_us = np.array([offset_ns // 1000], dtype=np.int64)
+        offset_us = np.array([round(self._clock.offset_us)], dtype=np.int64)
         track = on_axis(poses, self._told, offset_us, self.facts.terminal or "terminal")
         if not len(poses):
             return None
