@@ -86,6 +86,7 @@ def _serve(options: Options, scrubber: Scrubber) -> int:
     capture, jobs, store = Capture(), Jobs(), SettingsStore.opened()
     capture.start()
     preparation: Preparation | None = None
+    studio: Studio | None = None
     try:
         studio = Studio(capture, jobs, store, State(options.sessions), options.language)
         server = Server(studio, options.port, options.host, options.token)
@@ -101,6 +102,8 @@ def _serve(options: Options, scrubber: Scrubber) -> int:
         server.close()
     finally:
         capture.stop()
+        if studio is not None:
+            studio.end()
         jobs.close()
         if preparation is not None:
             preparation.close()

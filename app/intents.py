@@ -45,6 +45,26 @@ class SetFilter:
 
 
 @dataclass(frozen=True, slots=True)
+class FindTrackers:
+    """Look for streams of trackers."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseTracker:
+    """Use this tracker from now on; an empty source: none.
+
+    Attributes:
+        source: ``lsl:NAME``, or ``virtual:SEGMENT``.
+        terminal: Which of its terminals; empty: the first.
+        sensor: The sensor that sits on; empty: found from the motion.
+    """
+
+    source: str
+    terminal: str = ""
+    sensor: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Perform:
     """Let the wearer of the virtual glove do this."""
 
@@ -529,6 +549,8 @@ Intent: TypeAlias = (
     | DisconnectDevice
     | BlinkSensor
     | SetFilter
+    | FindTrackers
+    | ChooseTracker
     | Perform
     | ChooseSubject
     | SaveSubject

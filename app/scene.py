@@ -71,7 +71,10 @@ class Scene:
                 self._clear_hand()
                 self._show_sensors(view)
             case None:
-                self._clear_hand()
+                # pages fail where skin goes that they have only just begun to draw
+                self._hand.clear()
+                self._boards.clear()
+                self._skin.hide()
                 self._clear_sensors()
 
     def render_ghost(self, view: GhostView | None, shown: Shown) -> None:

@@ -72,6 +72,8 @@ class SkinNodes:
 
     def hide(self) -> None:
         """Out of sight, but kept."""
+        for patch in self._patches.values():
+            patch.hide()
         if self._skin is not None:
             self._skin.hide()
 

@@ -14,8 +14,10 @@ from app.review import Review
 from app.shaken import Shaking
 from app.sounds import Sound
 from app.taking import BLIP_S, Countdown, Disk
+from handstudio.arrays import Array
 from handstudio.device import find
 from handstudio.device.find import Found
+from handstudio.device.live_tracker import LiveNow
 from handstudio.device.orders import Newest
 from handstudio.errors import HandstudioError
 from handstudio.recording.bin import Binned
@@ -94,6 +96,23 @@ class JointFinding:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Tracking:
+    """The tracker in use, and which there are.
+
+    Attributes:
+        now: What is known of it; None: none is in use.
+        streams: Names of the streams that were found.
+        searching: They are being looked for.
+        anchor: Elbow and attitude of the world in the room where the picture begins.
+    """
+
+    now: LiveNow | None = None
+    streams: tuple[str, ...] = ()
+    searching: bool = False
+    anchor: tuple[Array, Array] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class State:
     """Everything the page is drawn from.
 
@@ -111,6 +130,7 @@ class State:
         guided: The course that is on.
         result: What came of the last course, until somebody has seen it.
         joint: What is found of a joint by trackers.
+        tracker: The tracker that goes along with the glove.
         asking: The page that must say whose hand it is before a take can begin.
         asking_for: The course that waits for that; empty: a take.
     """
@@ -137,6 +157,7 @@ class State:
     guided: Guided | None = None
     result: Result | None = None
     joint: JointFinding = JointFinding()
+    tracker: Tracking = Tracking()
     work: Work | None = None
     view: View = View.DESK
     aimed: int = 0

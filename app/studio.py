@@ -30,6 +30,7 @@ from app.solving import Answer
 from app.sounds import Sound
 from app.state import Download, Message, State
 from app.takes import Taker
+from app.tracking import StreamsFound, Tracker, with_tracker
 from app.words import _
 from app.workshop import (
     Added,
@@ -52,6 +53,7 @@ from handstudio.analysis.stretches import Stretch
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.heading import HeadingAlignment
+from handstudio.device.addresses import is_virtual
 from handstudio.device.capture import Capture
 from handstudio.device.orders import (
     Ask,
@@ -89,7 +91,9 @@ class Studio:
     store: SettingsStore
     state: State
     language: str | None = None  # asked for at the start; until another is chosen on the page
-    _inbox: queue.SimpleQueue[intents.Intent | Looked] = field(default_factory=queue.SimpleQueue)
+    _inbox: queue.SimpleQueue[intents.Intent | Looked | StreamsFound] = field(
+        default_factory=queue.SimpleQueue
+    )
 
     def __post_init__(self) -> None:
         self._keeper = Keeper(self.state.sessions)
@@ -99,6 +103,7 @@ class Studio:
         self._chooser = Chooser(self.capture)
         self._stands_for: tuple[str, Setup | None, bool] | None = None
         self._looker = Looker(self._inbox.put)
+        self._tracker = Tracker(self.capture, self._inbox.put)
         self._workshop = Workshop(self.jobs)
         self._reviewer = Reviewer(self._workshop)
         self._joints = JointFinder(self._workshop)
@@ -138,12 +143,17 @@ class Studio:
         idle = self.state.newest.phase in (Phase.IDLE, Phase.FAILED)
         self._looker.tick(elapsed_s, idle=idle and self.state.pages > 0)
         self.state = replace(self.state, searching=self._looker.busy)
+        self.state = replace(self.state, tracker=self._tracker.follow(self.state))
         review = self.state.review
         if review is not None and review.playing:
             self.state = replace(self.state, review=reviewing.advanced(review, elapsed_s))
         self._face_once()
         self._keep_settings(elapsed_s)
         return self.state
+
+    def end(self) -> None:
+        """Let go of what threads of its own hold."""
+        self._tracker.end()
 
     def refresh_takes(self) -> None:
         """Read the library again."""
@@ -155,11 +165,15 @@ class Studio:
 
     # --- intents --------------------------------------------------------------------------------
 
-    def _try(self, item: intents.Intent | Looked) -> None:
+    def _try(self, item: intents.Intent | Looked | StreamsFound) -> None:
         try:
             match item:
                 case Looked():
                     self._hear_looker(item)
+                case StreamsFound(problem=problem):
+                    self._tracker.found(item)
+                    if problem is not None:
+                        self._say(problem)
                 case _ if not any(
                     each(item)
                     for each in (
@@ -183,10 +197,14 @@ class Studio:
             case intents.ConnectDevice(address=address):
                 self.state = replace(self.state, live=None, shaking=None, yaw=None, review=None)
                 self._change(last_address=address)
-                self.capture.send(Connect(address, self._hand(), self._side()))
+                self._connect(address)
             case intents.DisconnectDevice():
                 self.capture.send(Disconnect())
                 self.state = replace(self.state, live=None, shaking=None)
+            case intents.FindTrackers():
+                self._tracker.look()
+            case intents.ChooseTracker():
+                self._choose_tracker(intent)
             case intents.BlinkSensor(name=name):
                 self._blink(name)
             case intents.Perform(motions=motions):
@@ -234,6 +252,7 @@ class Studio:
             case intents.SendDiagnostics(page=page):
                 self._send_diagnostics(page)
             case intents.FaceForward():
+                self._tracker.face_anew()
                 self.state = replace(self.state, yaw=None, aimed=self.state.aimed + 1)
             case intents.SetView(view=view):
                 self._change(camera=view.value if view in LASTING else "")
@@ -379,6 +398,31 @@ class Studio:
             case intents.FitPlots():
                 review = reviewing.fitted(review)
         self.state = replace(self.state, review=review)
+
+    def _connect(self, address: str) -> None:
+        try:
+            address = with_tracker(address, self.store.settings.tracker)
+        except HandstudioError as error:  # the glove is there all the same
+            self._say(error)
+        self.capture.send(Connect(address, self._hand(), self._side()))
+
+    def _choose_tracker(self, chosen: intents.ChooseTracker) -> None:
+        """The virtual one streams with the virtual glove, which begins anew for it."""
+        newest = self.state.newest
+        here = is_virtual(newest.address) and newest.phase is not Phase.FAILED
+        anew = here and with_tracker(newest.address, chosen.source) != newest.address
+        if anew and newest.recorder is not None:
+            raise HandstudioError(
+                "The virtual glove begins anew with its tracker, and a take is on.",
+                "Stop the take, then choose the tracker.",
+            )
+        self._change(
+            tracker=chosen.source,
+            tracker_terminal=chosen.terminal,
+            tracker_sensor=chosen.sensor,
+        )
+        if anew:
+            self._connect(newest.address)
 
     def _find(self) -> None:
         newest = self.state.newest

@@ -164,7 +164,7 @@ def follow(trial: Trial, performed: Trajectory | None = None) -> Followed:
     if trial.calibration == "own":
         setup, own, functional = _own(trial, setup, runs)
     if trial.calibration == "truth":
-        setup = calibrated(setup, subject=_as_it_is(worn))
+        setup = calibrated(setup, subject=as_it_is(worn))
     if trial.align and trial.calibration != "own":
         labels = [(span.start_s, span.end_s, span.name) for span in performed.spans]
         setup = _aligned(setup, trial, runs, labels=labels)
@@ -227,7 +227,7 @@ def _aligned(
     return msgspec.structs.replace(setup, heading_rad=alignment.psi_cor)
 
 
-def _as_it_is(worn: Worn) -> SubjectCalibration:
+def as_it_is(worn: Worn) -> SubjectCalibration:
     """A calibration that found everything: skeleton, mounting and places of the sensors."""
     layout, skeleton = worn.layout, worn.subject.skeleton
     q_sensor_segment = so3.conjugate(worn.mounting.q_segment_sensor)

@@ -18,7 +18,7 @@ import tyro
 
 from handstudio.calibration.correction import CorrectionFilter
 from handstudio.commands import calibration as calibration_commands
-from handstudio.commands import exporting, keeping, sharing
+from handstudio.commands import exporting, keeping, sharing, tracking
 from handstudio.commands import virtual as virtual_commands
 from handstudio.commands.aligning import aligned
 from handstudio.commands.arguments import Json, Sessions, TakeFile
@@ -27,7 +27,6 @@ from handstudio.commands.grasping import grasps
 from handstudio.commands.joints import joints
 from handstudio.commands.measuring import measure
 from handstudio.commands.noise import noise
-from handstudio.commands.tracking import add_track
 from handstudio.commands.writing import trace
 from handstudio.device import find
 from handstudio.device.capture import Capture
@@ -122,6 +121,10 @@ def record(
     visit: str = "",
     name: str = "take",
     hand_length_mm: float = ADULT_HAND_LENGTH_M * 1e3,
+    tracker: str | None = None,
+    terminal: str = "",
+    sensor: str = "",
+    lever_mm: tuple[float, float, float] | None = None,
     sessions: Sessions = None,
     json: Json = False,
 ) -> int:
@@ -134,6 +137,12 @@ def record(
         visit: Name of the visit; the day unless given.
         name: Name of the take.
         hand_length_mm: Wrist crease to the tip of the middle finger.
+        tracker: A tracker whose poses go into the take: lsl:NAME, a stream of the Lab Streaming
+            Layer (docs/late-trackers.md).
+        terminal: Which of its terminals; the first unless given.
+        sensor: The sensor of the glove that it sits on; found from the motion unless given.
+        lever_mm: Where it sits, along x, y and z of that sensor; found from fast movements unless
+            given.
         sessions: Folder of the takes.
         json: Print JSON for a program instead of words.
     """
@@ -146,16 +155,22 @@ def record(
         library.sessions_folder(sessions), subject, name, datetime.now().astimezone(), visit
     )
     capture = Capture()
+    reader = tracking.reader_of(capture, tracker, terminal, sensor, lever_mm)
     capture.start()
     try:
         with _ended_by_signals():
             capture.send(Connect(address, hand))
             _await_stream(capture)
+            if reader is not None:
+                tracking.await_poses(reader)
             capture.send(StartTake(path, subject))
             _record_for(capture, seconds, json)
     finally:
         capture.send(StopTake())
         capture.stop()
+        if reader is not None:
+            reader.end()
+            reader.join()
     _raise_what_failed(capture)
     return _tell_take(open_take(path), json)
 
@@ -221,6 +236,8 @@ def process(
             setup = smoothing(setup)
         with progress(path.name, quiet=json) as share:
             motion = process_take(take, setup, from_start=from_start, progress=share)
+        if not json:
+            tracking.tell_place(take, setup, motion)
         result: dict[str, Any] = {"take": str(path), "instants": len(motion)}
         if csv:
             table = FORMATS["csv"]
@@ -393,7 +410,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "trim": sharing.trim,
     "share": sharing.share,
     "add": sharing.add,
-    "add-track": add_track,
+    "add-track": tracking.add_track,
     "bin": keeping.bin,
     "restore": keeping.restore,
     "subjects": keeping.subjects,
@@ -510,6 +527,7 @@ def _tell_take(take: Take, json: bool, health: TakeHealth | None = None) -> int:
     if summary is not None:
         lost = f"{summary.missing} of {summary.packets + summary.missing} instants"
         rows += [["duration", f"{summary.duration_s:.2f} s"], ["lost", lost]]
+    rows += [["tracker", words] for words in tracking.tracks_in_words(take)]
     if health is not None:
         rows += [[key, value] for key, value in _health_facts(health, header).items()]
     print_table(str(take.path), ["", ""], rows)

@@ -2,7 +2,8 @@
 
 The track says where one sensor of the glove was; the inertial motion says the rest. Both are held
 together by `trackers.late_root`: its filter goes through the take instant by instant, so that
-cutting it anywhere changes no digit. What comes out is kept beside the take's motion.
+cutting it anywhere changes no digit. What comes out is kept beside the take's motion. A track that
+lies beside the take counts before one that was recorded with it.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
+import msgspec
 import numpy as np
 from jaxtyping import Float, Int64, UInt8
 
 from handstudio import __version__
 from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
-from handstudio.errors import CalibrationError, TrackError
+from handstudio.errors import CalibrationError, HandstudioError, TrackError
 from handstudio.fusion.vqf_filter import VqfFilter
 from handstudio.hand.pose import Pose, moved
 from handstudio.hand.skeleton import SEGMENTS
@@ -27,8 +29,15 @@ from handstudio.hand_fit import mechanism_of
 from handstudio.kinematics import pose_of
 from handstudio.maths import so3
 from handstudio.pipeline import Doubt, Motion
+from handstudio.recorded_track import recorded_track
 from handstudio.recording.take import Take
-from handstudio.recording.take_track import KeptTrack, TrackFacts, load_track, track_hash
+from handstudio.recording.take_track import (
+    KeptTrack,
+    TrackFacts,
+    load_track,
+    track_hash,
+    track_path,
+)
 from handstudio.setup import Setup
 from handstudio.trackers import late_root
 from handstudio.trackers.late_align import Alignment, align
@@ -38,10 +47,16 @@ from handstudio.trackers.track import Track
 WITHIN_S = 10.0
 """How far a tracker's clock may begin from the take's first instant, unless told."""
 
-_BELIEVED_SD_M = 0.05  # a place that is known worse is none
-_FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
+BELIEVED_SD_M = 0.05
+"""A place that is known worse is none."""
+
+TOLD_S = (-0.5, 1.5)
+"""How late what comes along with the bytes may be: the clock is the host's."""
+
+FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
+_ALIKE_RAD = 0.005
 _LEVER_SD_M = 0.03
-_AGAIN_S = (-0.1, 0.1)  # a kept track is aligned already; another setup may shift it a little
+AGAIN_S = (-0.1, 0.1)  # a kept track is aligned already; another setup may shift it a little
 _STEP = 2048
 _BAD = int(Doubt.UNPLACED | Doubt.SILENT)
 
@@ -57,6 +72,8 @@ class Root:
         sd_m: How sure the place of the sensor is, along one axis.
         fates: What was done with every pose (`trackers.late_faults.Fate`).
         sensor: The sensor the terminal sits on.
+        facts: What is known of the track.
+        pose_us: When the poses were.
     """
 
     time_us: Int64[Array, " n"]
@@ -65,6 +82,8 @@ class Root:
     sd_m: Float[Array, " n"]
     fates: UInt8[Array, " m"]
     sensor: str
+    facts: TrackFacts
+    pose_us: Int64[Array, " m"]
 
     def placing(self, pose: Pose, time_us: Int64[Array, " n"]) -> Pose:
         """A pose of instants of the motion, moved into the room; NaN where that is not known."""
@@ -98,8 +117,31 @@ def aligned_track(
         CalibrationError: it turns as no sensor does, or as another than the one that was named; or
             too little was seen of it.
     """
-    setup = take.header.setup
     track = replace(track, time_us=track.time_us + motion.time_us[0])
+    search_s = -within_s, within_s
+    return _aligned(
+        take,
+        take.header.setup,
+        motion,
+        track,
+        source=source,
+        sensor=sensor,
+        lever_m=lever_m,
+        search_s=search_s,
+    )
+
+
+def _aligned(
+    take: Take,
+    setup: Setup,
+    motion: Motion,
+    track: Track,
+    *,
+    source: str,
+    sensor: str | None,
+    lever_m: tuple[float, float, float] | None,
+    search_s: tuple[float, float],
+) -> KeptTrack:
     names = setup.layout.names
     if sensor is not None and sensor not in names:
         raise CalibrationError(
@@ -108,12 +150,12 @@ def aligned_track(
             sensor=sensor,
             known=", ".join(names),
         )
-    found, best = _best(setup, motion, track, sensor, (-within_s, within_s))
+    found, best = best_sensor(setup, motion, track, sensor, search_s)
     offset_us = round(found.delay_s * 1e6)
     track = replace(track, time_us=track.time_us - offset_us)
     sd = 0.0
     if lever_m is None:
-        filter = _filter(replace(found, delay_s=0.0), None)
+        filter = filter_of(replace(found, delay_s=0.0), None)
         felt = _felt(take, setup, motion, names.index(best))
         _placed, state = late_root.run(filter, late_root.begin(filter), felt, track)
         lever_m = tuple(state.lever.tolist())
@@ -133,9 +175,10 @@ def aligned_track(
 
 
 def root_of(take: Take, setup: Setup, motion: Motion) -> Root | None:
-    """Where the hand was in the room; None of a take without a track, or without a hand.
+    """Where the hand was in the room.
 
-    Computed once, then found beside the take's motion.
+    None of a take without a track, or without a hand; and where the track that was recorded with
+    it cannot be aligned: `root_or_why` says why. Computed once, then found beside the motion.
 
     Args:
         take: The recording.
@@ -144,19 +187,52 @@ def root_of(take: Take, setup: Setup, motion: Motion) -> Root | None:
 
     Raises:
         TakeError: the take or its track cannot be read.
-        TrackError: the track is not of this glove's layout.
-        CalibrationError: by this setup the track cannot be aligned.
+        TrackError: the track beside it is not of this glove's layout.
+        CalibrationError: by this setup the track beside it cannot be aligned.
     """
-    kept = load_track(take.path) if setup.layout.is_hand else None
-    if kept is None:
+    found = root_or_why(take, setup, motion)
+    if isinstance(found, HandstudioError) and track_path(take.path).exists():
+        raise found  # somebody added it, and waits for it
+    return found if isinstance(found, Root) else None
+
+
+def root_or_why(take: Take, setup: Setup, motion: Motion) -> Root | HandstudioError | None:
+    """As `root_of`; where a track cannot be aligned, why.
+
+    Raises:
+        TakeError: the take or its track cannot be read.
+    """
+    added = load_track(take.path) if setup.layout.is_hand else None
+    if added is None and (take.header.tracker is None or not setup.layout.is_hand):
         return None
-    path = _place(take, setup, motion)
-    root = _opened(path, kept, motion)
+    path = _place(take, setup, motion, "recorded" if added is None else track_hash(take.path))
+    root = _opened(path, motion)
     if root is None:
-        root = _computed(take, setup, motion, kept)
+        try:
+            kept = added or _as_recorded(take, setup, motion)
+            root = _computed(take, setup, motion, kept)
+        except (CalibrationError, TrackError) as error:
+            root = error
         with suppress(OSError):  # it can be computed again
             _keep(path, root)
     return root
+
+
+def _as_recorded(take: Take, setup: Setup, motion: Motion) -> KeptTrack:
+    """The track that was recorded with a take, aligned by a setup."""
+    facts, track = take.header.tracker, recorded_track(take, motion.time_us)
+    assert facts is not None  # or nobody asks
+    assert track is not None
+    return _aligned(
+        take,
+        setup,
+        motion,
+        track,
+        source=facts.source,
+        sensor=facts.sensor or None,
+        lever_m=facts.lever_m,
+        search_s=TOLD_S,
+    )
 
 
 def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root:
@@ -168,16 +244,16 @@ def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root
             sensor=kept.facts.sensor,
         )
     k = names.index(kept.facts.sensor)
-    found = align(*_attitudes(setup, motion, k), kept.track, _AGAIN_S)
-    filter = _filter(found, kept.facts.t_sensor_terminal)
+    found = align(*_attitudes(setup, motion, k), kept.track, AGAIN_S)
+    filter = filter_of(found, kept.facts.t_sensor_terminal)
     felt = _felt(take, setup, motion, k)
     placed, _ = late_root.run(filter, late_root.begin(filter), felt, kept.track)
-    believed = placed.sd_m <= _BELIEVED_SD_M
+    believed = placed.sd_m <= BELIEVED_SD_M
     q_room_world = np.where(believed[:, None], placed.q_room_world, np.nan)
     t_room_sensor = np.where(believed[:, None], placed.t_room_sensor, np.nan)
     t_room_elbow = np.concatenate(
         [
-            _elbow(setup, motion[at : at + _STEP], k, t_room_sensor[at:][:_STEP], q_at)
+            elbow_of(setup, motion[at : at + _STEP], k, t_room_sensor[at:][:_STEP], q_at)
             for at in range(0, len(motion), _STEP)
             for q_at in [q_room_world[at : at + _STEP]]
         ]
@@ -190,10 +266,12 @@ def _computed(take: Take, setup: Setup, motion: Motion, kept: KeptTrack) -> Root
         placed.sd_m,
         placed.fates,
         kept.facts.sensor,
+        kept.facts,
+        kept.track.time_us[: len(placed.fates)],
     )
 
 
-def _elbow(
+def elbow_of(
     setup: Setup, motion: Motion, k: int, t_room_sensor: Array, q_room_world: Array
 ) -> Array:
     """From a sensor to its segment's joint, and from there along the bones."""
@@ -207,17 +285,17 @@ def _elbow(
 
 def _attitudes(setup: Setup, motion: Motion, k: int) -> tuple[Array, Array]:
     placed = (motion.doubt[:, k] & _BAD) == 0
-    return np.array(motion.time_us[placed]), _in_time(setup, motion.q_world_sensor[:, k])[placed]
+    return np.array(motion.time_us[placed]), in_time(setup, motion.q_world_sensor[:, k])[placed]
 
 
-def _in_time(setup: Setup, q: Array) -> Array:
+def in_time(setup: Setup, q: Array) -> Array:
     """Attitudes of the instants they are said to be of.
 
     VQF adds the newest rate for the whole interval that it ends, so it is half an interval ahead
     where rates are of an instant; at 10 rad/s and 100 Hz that is 3 degrees.
     """
     q = np.array(q)
-    if not isinstance(setup.filter, VqfFilter) or setup.mean_rates or len(q) < 2:
+    if is_in_time(setup) or len(q) < 2:
         return q
     before, now = q[:-1], q[1:]
     near = np.sum(before * now, axis=-1, keepdims=True) < 0.0
@@ -225,7 +303,12 @@ def _in_time(setup: Setup, q: Array) -> Array:
     return q
 
 
-def _best(
+def is_in_time(setup: Setup) -> bool:
+    """Whether the filter's attitudes are of their instants as they come."""
+    return not isinstance(setup.filter, VqfFilter) or setup.mean_rates
+
+
+def best_sensor(
     setup: Setup,
     motion: Motion,
     track: Track,
@@ -240,21 +323,26 @@ def _best(
     first = [] if wanted is None else [wanted]
     refused: CalibrationError | None = None
     for name in [*first, *(n for n in names if n not in first)]:
-        if wanted in found and found[wanted].residual_rad <= _FIXED_RAD:
+        if wanted in found and found[wanted].residual_rad <= FIXED_RAD:
             break
         try:
             found[name] = align(*_attitudes(setup, motion, names.index(name)), track, search_s)
             if len(found) == 1:
                 clock_s = found[name].delay_s
-                search_s = clock_s + _AGAIN_S[0], clock_s + _AGAIN_S[1]
+                search_s = clock_s + AGAIN_S[0], clock_s + AGAIN_S[1]
         except CalibrationError as error:
             refused = refused or error
     if not found:
         assert refused is not None  # there is a sensor
         raise refused
-    best = min(found, key=lambda name: found[name].residual_rad)
+    least = min(each.residual_rad for each in found.values())
+    # boards beside each other turn alike: of those that nothing tells apart, nearest to the root
+    best = min(
+        (name for name, each in found.items() if each.residual_rad <= least + _ALIKE_RAD),
+        key=lambda name: _depth(setup, name),
+    )
     chosen = wanted or best
-    if chosen not in found or found[chosen].residual_rad > _FIXED_RAD:
+    if chosen not in found or found[chosen].residual_rad > FIXED_RAD:
         raise CalibrationError(
             "The terminal {terminal} does not stay with {sensor}; of all it stays best with "
             "{best}, within {degrees:.1f} deg.",
@@ -267,7 +355,14 @@ def _best(
     return found[chosen], chosen
 
 
-def _filter(found: Alignment, lever: tuple[float, float, float] | None) -> RootFilter:
+def _depth(setup: Setup, sensor: str) -> int:
+    """How far a sensor's segment is from the root, in the order of segments."""
+    segment = setup.layout.sensors[setup.layout.names.index(sensor)].segment
+    return SEGMENTS.index(segment) if segment in SEGMENTS else len(SEGMENTS)
+
+
+def filter_of(found: Alignment, lever: tuple[float, float, float] | None) -> RootFilter:
+    """The filter that goes on from an alignment; a lever that is not known is estimated."""
     sd = _LEVER_SD_M if lever is None else 0.0
     like = RootFilter(t_sensor_terminal=lever or (0.0, 0.0, 0.0), lever_sd=sd, delay_sd=0.01)
     return late_root.filter_for(found, like)
@@ -280,40 +375,51 @@ def _felt(take: Take, setup: Setup, motion: Motion, k: int) -> Felt:
         sound = run if setup.sensors is None else corrected(run, setup.sensors, setup.layout.names)
         acc.append(sound.acc[:, k])
     known = (motion.doubt[:, k] & _BAD) == 0
-    time_us, q = np.array(motion.time_us), _in_time(setup, motion.q_world_sensor[:, k])
+    time_us, q = np.array(motion.time_us), in_time(setup, motion.q_world_sensor[:, k])
     return Felt(time_us, q, np.concatenate(acc), known)
 
 
-def _place(take: Take, setup: Setup, motion: Motion) -> Path:
-    parts = f"{take.sha256()} {setup.key} {__version__} {track_hash(take.path)} {len(motion)}"
+def _place(take: Take, setup: Setup, motion: Motion, track: str) -> Path:
+    parts = f"{take.sha256()} {setup.key} {__version__} {track} {len(motion)}"
     key = hashlib.sha256(parts.encode()).hexdigest()[:16]
     return take.path.with_suffix(".motion") / f"root-{key}.npz"
 
 
-def _keep(path: Path, root: Root) -> None:
+def _keep(path: Path, root: Root | HandstudioError) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(path.name + ".new")
     with fresh.open("wb") as file:
-        np.savez(
-            file,
-            t_room_elbow=root.t_room_elbow,
-            q_room_world=root.q_room_world,
-            sd_m=root.sd_m,
-            fates=root.fates,
-        )
+        if isinstance(root, HandstudioError):
+            np.savez(file, why=np.array([root.what, root.remedy]))
+        else:
+            np.savez(
+                file,
+                t_room_elbow=root.t_room_elbow,
+                q_room_world=root.q_room_world,
+                sd_m=root.sd_m,
+                fates=root.fates,
+                facts=np.array(msgspec.json.encode(root.facts).decode()),
+                pose_us=root.pose_us,
+            )
     fresh.replace(path)
 
 
-def _opened(path: Path, kept: KeptTrack, motion: Motion) -> Root | None:
+def _opened(path: Path, motion: Motion) -> Root | HandstudioError | None:
     try:
         with path.open("rb") as stream, np.load(stream) as file:
+            if "why" in file:
+                what, remedy = map(str, file["why"])
+                return CalibrationError("{what}", "{remedy}", what=what, remedy=remedy)
+            facts = msgspec.json.decode(str(file["facts"]), type=TrackFacts)
             return Root(
                 np.array(motion.time_us),
                 file["t_room_elbow"],
                 file["q_room_world"],
                 file["sd_m"],
                 file["fates"],
-                kept.facts.sensor,
+                facts.sensor,
+                facts,
+                file["pose_us"],
             )
-    except (OSError, KeyError, ValueError, EOFError, BadZipFile):
+    except (OSError, KeyError, ValueError, EOFError, BadZipFile, msgspec.MsgspecError):
         return None

@@ -59,6 +59,10 @@ class Settings(msgspec.Struct, frozen=True):
         plot_span_s: How much time live plots show.
         filter: Name of the live filter; empty: whatever suits the device.
         curves: Name of the set of curves that is plotted.
+        tracker: Address of the tracker in use: ``lsl:NAME``, or ``virtual:SEGMENT`` for the one on
+            the virtual glove; empty: none.
+        tracker_terminal: Which of its terminals; empty: the first.
+        tracker_sensor: The sensor that sits on; empty: found from the motion.
     """
 
     language: str = ""
@@ -77,6 +81,9 @@ class Settings(msgspec.Struct, frozen=True):
     plot_span_s: float = 10.0
     filter: str = ""
     curves: str = "overview"
+    tracker: str = ""
+    tracker_terminal: str = ""
+    tracker_sensor: str = ""
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

@@ -6,9 +6,10 @@ bit, that of the same instants of the whole take.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 
 import msgspec
@@ -27,11 +28,13 @@ from handstudio.recording.notes import Label, Mark, Notes, load_notes, save_note
 from handstudio.recording.samples_message import encode_samples
 from handstudio.recording.take import FirstState, Take, pack_first_state
 from handstudio.recording.take_track import load_track, save_track
+from handstudio.recording.tracker_message import Poses
 from handstudio.recording.writer import TakeWriter
 from handstudio.samples import Event, ImuSamples
 from handstudio.stream import EventStream
 
 _BATCH = 256  # events of what comes before the part, fused at a time
+_POSES_BESIDE_NS = 1_000_000_000  # a tracker is late: poses of so long around the part come along
 
 
 def trim(
@@ -128,13 +131,19 @@ def _write(
     watch, done = Watch(), 0
     watch.begin(header.setup)
     watch.begin_take()
+    told, newest_ns = _told(take, start_ns - _POSES_BESIDE_NS), start_ns
     writer = TakeWriter(target, header, pack_first_state(known))
     try:
         for piece in pieces:
-            writer.write(piece.log_ns, piece.data)
+            newest_ns = piece.log_ns
+            while told and told[0].arrival_ns[0] <= newest_ns:
+                writer.write_poses(told.popleft())
+            writer.write(newest_ns, piece.data)
             watch.note(piece.packets, piece.events, None if imported else piece.log_ns)
             done += _instants(piece.events)
             progress(min(1.0, done / len(time_s)))
+        while told and told[0].arrival_ns[0] <= newest_ns + _POSES_BESIDE_NS:
+            writer.write_poses(told.popleft())
         health = watch.end_take()
         assert health is not None  # a take was begun
         seconds = float(time_s[-1] - time_s[0])
@@ -143,6 +152,14 @@ def _write(
     except BaseException:
         writer.discard()  # a copy of a part: the whole take still has it
         raise
+
+
+def _told(take: Take, from_ns: int) -> deque[Poses]:
+    """What a tracker told from then on, by arrival."""
+    poses = take.poses()
+    poses = poses[poses.arrival_ns >= from_ns]
+    _, first = np.unique(poses.arrival_ns, return_index=True)
+    return deque(poses[a:b] for a, b in pairwise([*sorted(first.tolist()), len(poses)]))
 
 
 def _of_wire(take: Take, first: int, stop: int) -> tuple[FirstState, Iterator[_Piece]]:

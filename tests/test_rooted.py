@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,13 +19,16 @@ from handstudio.export.part import Processed
 from handstudio.kinematics import pose_of
 from handstudio.maths import so3
 from handstudio.process import process
+from handstudio.recording.header import with_tracker
 from handstudio.recording.naming import belongings
 from handstudio.recording.parcel import pack, take_in
 from handstudio.recording.simulated import rehearse, simulate
-from handstudio.recording.take import open_take
+from handstudio.recording.take import open_take, pack_first_state
 from handstudio.recording.take_track import load_track, save_track, track_path
+from handstudio.recording.tracker_message import Poses, TrackerFacts
 from handstudio.recording.truth import load_truth
-from handstudio.rooted import aligned_track, root_of
+from handstudio.recording.writer import TakeWriter
+from handstudio.rooted import aligned_track, root_of, root_or_why
 from handstudio.simulation.imperfections.strengths import IDEAL
 from handstudio.trackers.late_align import attitude_at
 from handstudio.trackers.track import Track
@@ -165,6 +169,72 @@ def test_the_command_reads_a_file(take, track, tmp_path, capsys):
     assert ended.value.code == 0
     assert "hand sits on SN4" in capsys.readouterr().out
     assert load_track(copy).facts.lever_source == "measured"
+
+
+def recorded(take: Path, track: Track, target: Path, own_us=None, facts=None) -> Path:
+    """The take as if a tracker 50 ms late had been connected while it was recorded."""
+    opened = open_take(take)
+    facts = facts or TrackerFacts("lsl:room", "hand", SENSOR, LEVER)
+    header = with_tracker(opened.header, facts)
+    writer = TakeWriter(target, header, pack_first_state(opened.first_state))
+    late_us = track.time_us + round(1e6 * (BEGINS_S + 0.05))
+    arrival_ns = opened.header.start_utc_ns + 1000 * late_us
+    own_us = arrival_ns // 1000 if own_us is None else own_us(late_us)
+    poses = Poses(arrival_ns, own_us, track.t_room_terminal, track.q_room_terminal, track.quality)
+    told = 0
+    for arrived_ns, chunk in opened.chunks():
+        while told < len(poses) and arrival_ns[told] < arrived_ns:
+            writer.write_poses(poses[told : told + 1])
+            told += 1
+        writer.write(arrived_ns, chunk)
+    return writer.close(opened.summary)
+
+
+def test_a_track_that_was_recorded_with_the_take_gives_the_same_places(
+    take, track, motion, root, tmp_path
+):
+    opened = open_take(recorded(take, track, tmp_path / "with.mcap"))
+    assert opened.summary.poses == len(opened.poses()) > 500
+    setup = opened.header.setup
+    np.testing.assert_array_equal(process(opened).q_world_sensor, motion.q_world_sensor)
+    mine = root_of(opened, setup, motion)
+    assert mine.facts.offset_s == pytest.approx(0.05, abs=0.005)
+    assert mine.facts.source == "lsl:room"
+    off = np.linalg.norm(mine.t_room_elbow - root.t_room_elbow, axis=-1)
+    assert np.nanmax(off[motion.time_us > 5_000_000]) < 0.004
+    save_track(opened.path, load_track(take))  # what somebody added counts
+    assert root_of(opened, setup, motion).facts.source == "t.csv"
+
+
+@pytest.mark.parametrize("own_us", [np.zeros_like, lambda late: late + 987_654_321_000])
+def test_a_tracker_without_a_clock_or_with_its_own_is_aligned(take, track, root, tmp_path, own_us):
+    opened = open_take(recorded(take, track, tmp_path / "clocks.mcap", own_us))
+    mine = root_of(opened, opened.header.setup, process(opened))
+    off = np.linalg.norm(mine.t_room_elbow - root.t_room_elbow, axis=-1)
+    assert np.nanmax(off[root.time_us > 5_000_000]) < 0.005
+
+
+def test_what_cannot_be_aligned_is_said_and_stops_nothing(take, track, motion, tmp_path):
+    frozen = replace(
+        track, q_room_terminal=np.tile(track.q_room_terminal[:1], (len(track.q_room_terminal), 1))
+    )
+    opened = open_take(recorded(take, frozen, tmp_path / "frozen.mcap"))
+    assert root_of(opened, opened.header.setup, motion) is None
+    why = root_or_why(opened, opened.header.setup, motion)
+    assert "does not turn as the sensor does" in why.what
+    again = root_or_why(opened, opened.header.setup, motion)  # as it was kept
+    assert (again.what, again.remedy) == (why.what, why.remedy)
+    swapped = TrackerFacts("lsl:room", "hand", "SN1")
+    opened = open_take(recorded(take, track, tmp_path / "swapped.mcap", facts=swapped))
+    assert "does not stay with SN1" in root_or_why(opened, opened.header.setup, motion).what
+
+
+def test_a_part_of_a_take_has_its_poses(take, track, root, tmp_path):
+    part = open_take(trim(open_take(recorded(take, track, tmp_path / "long.mcap")), 6.0, 12.0))
+    again = root_of(part, part.header.setup, process(part))
+    first = np.searchsorted(root.time_us, again.time_us[0])
+    off = again.t_room_elbow - root.t_room_elbow[first : first + len(again.time_us)]
+    assert np.nanmax(np.linalg.norm(off[200:], axis=-1)) < 0.012
 
 
 def _track(take: Path, sensor: str) -> Track:

@@ -7,6 +7,7 @@ import viser
 from app import intents
 from app.filtering import wanted_of
 from app.panels.base import QUIET, Send, put, typed
+from app.panels.tracker import TrackerPanel
 from app.panels.virtual import VirtualPanel
 from app.state import State
 from app.views.filters import filter_words, preparing_of
@@ -51,6 +52,7 @@ class DevicePanel:
             hint=_("What turns readings into orientations; another one begins anew at a rest"),
         )
         self._preparing = gui.add_markdown("", visible=False)
+        self._tracker = TrackerPanel(gui, send, state)
         self._connected = False
         self._connect.on_click(lambda _event: self._toggle())
         self._find.on_click(lambda _event: send(intents.FindDevices()))
@@ -80,6 +82,7 @@ class DevicePanel:
         preparing = preparing_of(state)
         put(self._preparing, visible=bool(preparing), content=preparing)
         self._render_facts(state)
+        self._tracker.render(state)
 
     def _choose_the_last(self) -> None:
         """The device of the time before, where it is there; once, as choosing is the person's."""

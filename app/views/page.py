@@ -19,11 +19,12 @@ from app.words import _, in_words
 from handstudio.arrays import Array
 from handstudio.device.health import HealthView
 from handstudio.device.orders import Newest, Phase
-from handstudio.hand.pose import Pose
+from handstudio.hand.pose import Pose, moved
 from handstudio.hand.skeleton import Skeleton
 from handstudio.hand_fit import fit_of
 from handstudio.kinematics import doubtful_segments, pose_of
 from handstudio.layout import Layout
+from handstudio.maths import so3
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import Setup
 
@@ -128,11 +129,27 @@ def scene_of(state: State) -> HandView | SensorsView | None:
     pose = pose_of(setup, motion.q_world_sensor, fit)
     doubtful = doubtful_segments(setup, motion.doubt & ~np.uint8(Doubt.SILENT))[0]
     dead = doubtful_segments(setup, motion.doubt & np.uint8(Doubt.SILENT))[0]
+    pose = _in_room(state, setup, pose)
     single = Pose(pose.q_world_segment[0], pose.t_world_joint[0], pose.t_world_tip[0])
     lit = frozenset[str]()
     if state.review is None and state.shaking is not None and state.shaking.sensor is not None:
         lit = frozenset({setup.layout.names[state.shaking.sensor]})
     return HandView(setup.layout, fit.skeleton, single, doubtful, dead, lit)
+
+
+def _in_room(state: State, setup: Setup, pose: Pose) -> Pose:
+    """The live hand where a tracker sees it, from where it was when that was found."""
+    tracking = state.tracker
+    if state.review is not None or tracking.now is None or tracking.anchor is None:
+        return pose
+    root = tracking.now.root
+    if root.t_room_elbow is None or root.q_room_world is None or root.setup != setup:
+        return pose
+    elbow, q_room_world = tracking.anchor
+    q_world_room = so3.conjugate(q_room_world)
+    q_world_now = so3.multiply(q_world_room, root.q_room_world)
+    t_world_elbow = so3.rotate(q_world_room, root.t_room_elbow - elbow)
+    return moved(pose, q_world_now[None], t_world_elbow[None])
 
 
 def overlay_of(state: State) -> str:

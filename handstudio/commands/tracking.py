@@ -1,7 +1,8 @@
-"""The command that puts the track of a tracker beside a take."""
+"""Trackers in the shell: recorded along with a take, or their track put beside one."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,15 +11,23 @@ import numpy as np
 import tyro
 
 from handstudio.commands.arguments import Json, TakeFile
-from handstudio.errors import TrackError
+from handstudio.device.capture import Capture
+from handstudio.device.orders import SetTracker
+from handstudio.device.tracker import TrackerPhase, TrackerReader
+from handstudio.errors import DeviceError, HandstudioError, TrackError
+from handstudio.pipeline import Motion
 from handstudio.process import process
-from handstudio.recording.take import open_take
-from handstudio.recording.take_track import save_track
+from handstudio.recording.take import Take, open_take
+from handstudio.recording.take_track import TrackFacts, load_track, save_track
+from handstudio.recording.tracker_message import TrackerFacts
 from handstudio.recording.tracks import read_tracks
-from handstudio.rooted import WITHIN_S, aligned_track, root_of
-from handstudio.shell import out, print_json, progress
+from handstudio.rooted import WITHIN_S, Root, aligned_track, root_of, root_or_why
+from handstudio.setup import Setup
+from handstudio.shell import err, out, print_json, progress
 from handstudio.trackers.late_faults import Fate, told_faults
 from handstudio.trackers.track import Track
+
+_FOUND_S = 15.0
 
 _SAID = {
     Fate.LOST: "not seen",
@@ -59,8 +68,7 @@ def add_track(
     setup = opened.header.setup
     with progress(take.name, quiet=json) as share:
         motion = process(opened, setup, progress=share)
-    x, y, z = lever_mm or (0.0, 0.0, 0.0)
-    lever = None if lever_mm is None else (x * 1e-3, y * 1e-3, z * 1e-3)
+    lever = _metres(lever_mm)
     kept = aligned_track(
         opened, motion, track, file.name, sensor=sensor, lever_m=lever, within_s=within_s
     )
@@ -76,16 +84,82 @@ def add_track(
         facts: dict[str, Any] = msgspec.to_builtins(kept.facts)
         print_json(facts | {"faults": found})
         return 0
-    facts_of = kept.facts
-    lever_shown = ", ".join(f"{1e3 * x:.1f}" for x in facts_of.t_sensor_terminal)
+    _tell(kept.facts, faults)
+    return 0
+
+
+def reader_of(
+    capture: Capture,
+    address: str | None,
+    terminal: str,
+    sensor: str,
+    lever_mm: tuple[float, float, float] | None,
+) -> TrackerReader | None:
+    """Whoever reads a tracker into the takes of a capture; started. None where none is named.
+
+    Raises:
+        DeviceError: that is no tracker's address.
+    """
+    if address is None:
+        return None
+    facts = TrackerFacts(address, terminal, sensor, _metres(lever_mm))
+    reader = TrackerReader(facts, capture)
+    capture.send(SetTracker(facts))
+    reader.start()
+    return reader
+
+
+def await_poses(reader: TrackerReader) -> None:
+    """Wait until a tracker tells something.
+
+    Raises:
+        DeviceError: it is not there.
+    """
+    end = time.monotonic() + _FOUND_S
+    while reader.newest.phase is not TrackerPhase.STREAMING:
+        if time.monotonic() > end:
+            raise reader.newest.problem or DeviceError(
+                "The tracker {address} tells nothing.",
+                "Start its streaming, or record without --tracker.",
+                address=reader.newest.facts.source,
+            )
+        time.sleep(0.02)
+
+
+def tracks_in_words(take: Take) -> list[str]:
+    """What a take knows of a tracker: what lies beside it, else what was recorded with it."""
+    kept, told = load_track(take.path), take.header.tracker
+    if kept is not None:
+        return [f"{kept.facts.terminal} on {kept.facts.sensor}, added from {kept.facts.source}"]
+    if told is None:
+        return []
+    on = f" on {told.sensor}" if told.sensor else ""
+    count = "" if take.summary is None else f", {take.summary.poses} poses"
+    return [f"{told.terminal or 'terminal'}{on} from {told.source}{count}"]
+
+
+def tell_place(take: Take, setup: Setup, motion: Motion) -> None:
+    """Say where the hand's place in the room comes from, or why there is none."""
+    root = root_or_why(take, setup, motion)
+    if isinstance(root, HandstudioError):
+        err.print(f"No place in the tracker's room: {root.what} {root.remedy}")
+    elif isinstance(root, Root):
+        _tell(root.facts, told_faults(root.fates, root.pose_us))
+
+
+def _metres(mm: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+    return None if mm is None else (mm[0] * 1e-3, mm[1] * 1e-3, mm[2] * 1e-3)
+
+
+def _tell(facts: TrackFacts, faults: list[tuple[Fate, float, float, int]]) -> None:
+    lever = ", ".join(f"{1e3 * x:.1f}" for x in facts.t_sensor_terminal)
     out.print(
-        f"{facts_of.terminal} sits on {facts_of.sensor}, at {lever_shown} mm "
-        f"({facts_of.lever_source}); told {facts_of.offset_s:+.3f} s after the take's clock, "
-        f"attitudes agree within {np.rad2deg(facts_of.residual_rad):.1f} deg."
+        f"{facts.terminal} sits on {facts.sensor}, at {lever} mm "
+        f"({facts.lever_source}); told {facts.offset_s:+.3f} s after the take's clock, "
+        f"attitudes agree within {np.rad2deg(facts.residual_rad):.1f} deg."
     )
     for fate, begin, end, count in faults:
         out.print(f"  {begin:.2f} to {end:.2f} s of the track, {count} poses: {_SAID[fate]}")
-    return 0
 
 
 def _chosen(tracks: tuple[Track, ...], terminal: str | None) -> Track:

@@ -30,6 +30,7 @@ from handstudio.device.orders import (
     Connect,
     Disconnect,
     HeadingTaken,
+    Moved,
     Newest,
     NotePage,
     Order,
@@ -41,6 +42,8 @@ from handstudio.device.orders import (
     SetHeading,
     SetSensors,
     SetSubject,
+    SetTracker,
+    ShareMoves,
     ShareSamples,
     StartTake,
     StopTake,
@@ -59,8 +62,9 @@ from handstudio.protocol.packets import (
     Restart,
     Result,
 )
-from handstudio.recording.header import Header
+from handstudio.recording.header import Header, with_tracker
 from handstudio.recording.take import FirstState, pack_first_state
+from handstudio.recording.tracker_message import TrackerFacts
 from handstudio.samples import Event, ImuSamples, Ranges
 from handstudio.setup import HandModel, Setup, for_device
 from handstudio.stream import EventStream
@@ -92,11 +96,13 @@ class Capture:
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
         self._history: deque[Motion] = deque(maxlen=HISTORY)
         self._samples: deque[ImuSamples] | None = None  # only while somebody wants them
+        self._moves: deque[Moved] | None = None  # likewise
         self._reports: deque[Report] = deque(maxlen=100)
         self._closing: list[Recorder] = []
         self._wanted: _Wanted | None = None
         self._known = Known()
         self._waiting: Known | None = None  # what is known since the take began
+        self._tracker: TrackerFacts | None = None
         self._line: Line | None = None
         self._stream = EventStream("handstudio-1", None)
         self._state: pipeline.State | None = None
@@ -113,6 +119,10 @@ class Capture:
         """Ask for something; returns at once."""
         self._orders.put(order)
 
+    def recorder(self) -> Recorder | None:
+        """The take that is on."""
+        return self.newest.recorder
+
     def drain(self) -> list[Motion]:
         """The motions since the last call, oldest first; for one reader."""
         return _emptied(self._history)
@@ -124,6 +134,11 @@ class Capture:
         """
         samples = self._samples
         return [] if samples is None else _emptied(samples)
+
+    def drain_moves(self) -> list[Moved]:
+        """What every chunk told since the last call, oldest first; for one reader, who asked."""
+        moves = self._moves
+        return [] if moves is None else _emptied(moves)
 
     def reports(self) -> list[Report]:
         """What happened since the last call, oldest first; for one reader."""
@@ -188,12 +203,16 @@ class Capture:
                 self._pass_on(order)
             case ShareSamples(on=on):
                 self._samples = deque(maxlen=HISTORY) if on else None
+            case ShareMoves(on=on):
+                self._moves = deque(maxlen=HISTORY) if on else None
             case SetSubject(calibration=calibration):
                 self._learn(replace(self._newly_known, subject=calibration))
             case SetSensors(errors=errors):
                 self._learn(replace(self._newly_known, sensors=errors))
             case SetFilter(filter=chosen):
                 self._learn(replace(self._newly_known, filter=chosen))
+            case SetTracker(facts=facts):
+                self._tracker = facts
             case SetHeading(headings=headings):
                 self._turn_to(headings)
             case ResetHeading(sensor=sensor):
@@ -323,7 +342,7 @@ class Capture:
             motion, self._state = pipeline.run(self.newest.setup, self._state, events)
             if len(motion):
                 self._publish(motion, arrival_ns, line)
-                self._share(motion, events)
+                self._share(arrival_ns, motion, events)
         self._health.note(packets, events, arrival_ns)  # after the pose: nobody waits for it
         for packet in packets:
             self._heed(packet, line)
@@ -343,15 +362,22 @@ class Capture:
             problem=None,
         )
 
-    def _share(self, motion: Motion, events: Sequence[Event]) -> None:
+    def _share(self, arrival_ns: int, motion: Motion, events: Sequence[Event]) -> None:
         """Samples for whoever wants them, on the time axis of the motion."""
-        runs = [event for event in events if isinstance(event, ImuSamples)]
-        if self._samples is None or sum(map(len, runs)) != len(motion):
+        samples, moves, setup = self._samples, self._moves, self.newest.setup
+        if (samples is None and moves is None) or setup is None:
             return
-        at = 0
+        runs = [event for event in events if isinstance(event, ImuSamples)]
+        if sum(map(len, runs)) != len(motion):
+            return
+        at, timed = 0, list[ImuSamples]()
         for run in runs:
-            self._samples.append(replace(run, time_us=motion.time_us[at : at + len(run)]))
+            timed.append(replace(run, time_us=motion.time_us[at : at + len(run)]))
             at += len(run)
+        if samples is not None:
+            samples.extend(timed)
+        if moves is not None:
+            moves.append(Moved(arrival_ns, setup, motion, tuple(timed)))
 
     def _heed(self, packet: Packet, line: Line) -> None:
         if line is not self._line:
@@ -572,6 +598,7 @@ class Capture:
         header = Header(
             order.path.stem, order.subject, now_ns(), setup, "wire", self.newest.address
         )
+        header = with_tracker(header, self._tracker)
         try:
             recorder = Recorder(order.path, header, pack_first_state(first))
         except HandstudioError as error:

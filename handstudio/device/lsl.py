@@ -1,4 +1,4 @@
-"""Trackers that stream by the Lab Streaming Layer: poses as they come, on this machine's clock.
+"""Trackers that stream by the Lab Streaming Layer: poses as they come, on the host's clock.
 
 The stream's channels must be labelled as the columns of `trackers.columns`, in its description as
 the layer's own conventions have it (``channels/channel/label``). Needs the extra ``trackers``.
@@ -6,17 +6,21 @@ the layer's own conventions have it (``channels/channel/label``). Needs the extr
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
 
 from handstudio.arrays import Array
+from handstudio.device.host_clock import now_ns
 from handstudio.errors import DeviceError, TrackError
 from handstudio.trackers.columns import tracks_of
 from handstudio.trackers.track import Track
 
 CLOCK_AGAIN_S = 5.0
 """How often the sender's clock is compared with ours anew."""
+
+_LEAST_CHANNELS = 6  # of a pose: three of place, three angles or more
 
 
 class LslTracker:
@@ -29,7 +33,7 @@ class LslTracker:
             DeviceError: the layer is not installed, or no such stream is there.
             TrackError: its channels are no poses.
         """
-        self._lsl = _library()
+        self._lsl = library()
         found = self._lsl.resolve_byprop("name", name, timeout=timeout_s)
         if not found:
             raise DeviceError(
@@ -45,6 +49,7 @@ class LslTracker:
         self._labels = _labels(self._inlet.info(timeout_s))
         self._offset_s = float(self._inlet.time_correction(timeout_s))
         self._corrected_s = float(self._lsl.local_clock())
+        self._host_us = now_ns() / 1000 - 1e6 * self._corrected_s  # both clocks are steady
         self.tracks_of(np.empty(0), np.empty((0, len(self._labels))))
 
     def read(self, timeout_s: float) -> tuple[Track, ...]:
@@ -68,9 +73,15 @@ class LslTracker:
         return self.tracks_of(np.asarray(stamps, dtype=float) + self._offset_s, values)
 
     def tracks_of(self, time_s: Array, values: Array) -> tuple[Track, ...]:
-        """Rows of the stream's channels as tracks, times [s] of this machine's clock."""
+        """Rows of the stream's channels as tracks.
+
+        Args:
+            time_s: By this machine's clock of the layer [s]; the tracks have the host's.
+            values: One column a channel. Where they are no pose, nothing was seen.
+        """
         columns = dict(zip(self._labels, values.T, strict=True))
-        return tracks_of(self._name, columns, np.round(1e6 * time_s).astype(np.int64))
+        time_us = np.round(1e6 * time_s + self._host_us).astype(np.int64)
+        return tracks_of(self._name, columns, time_us, refuse=False)
 
     def close(self) -> None:
         """Let go; never raises."""
@@ -80,11 +91,35 @@ class LslTracker:
         now = float(self._lsl.local_clock())
         if now - self._corrected_s > CLOCK_AGAIN_S:
             # a measurement that is there already; waiting for one would hold up poses
-            self._offset_s = float(self._inlet.time_correction(0.2))
+            with contextlib.suppress(RuntimeError):  # it is away: the last one holds
+                self._offset_s = float(self._inlet.time_correction(0.2))
             self._corrected_s = now
 
 
-def _library() -> Any:
+def stream_names(wait_s: float = 1.0) -> list[str]:
+    """Names of the streams that are there and have enough numeric channels for a pose.
+
+    Raises:
+        DeviceError: the layer is not installed.
+    """
+    lsl = library()
+    found = lsl.resolve_streams(wait_s)
+    numbers = lsl.cf_float32, lsl.cf_double64
+    return sorted(
+        {
+            one.name()
+            for one in found
+            if one.channel_count() >= _LEAST_CHANNELS and one.channel_format() in numbers
+        }
+    )
+
+
+def library() -> Any:
+    """The layer's own module.
+
+    Raises:
+        DeviceError: it is not installed.
+    """
     try:
         import pylsl  # noqa: PLC0415 - an extra
     except (ImportError, RuntimeError, OSError) as error:  # the last two: its library is missing

@@ -15,6 +15,8 @@ from handstudio.errors import HandstudioError
 from handstudio.health.findings import Finding
 from handstudio.pipeline import Motion
 from handstudio.protocol.packets import Description, Reply
+from handstudio.recording.tracker_message import TrackerFacts
+from handstudio.samples import ImuSamples
 from handstudio.setup import AnyFilter, HandModel, Setup
 
 
@@ -78,6 +80,16 @@ class SetFilter:
 
 
 @dataclass(frozen=True, slots=True)
+class SetTracker:
+    """The tracker whose poses go into takes that begin from now on; None: none.
+
+    A take that is on keeps the one that it began with.
+    """
+
+    facts: TrackerFacts | None
+
+
+@dataclass(frozen=True, slots=True)
 class StartTake:
     """Record from now on."""
 
@@ -113,6 +125,13 @@ class ShareSamples:
 
 
 @dataclass(frozen=True, slots=True)
+class ShareMoves:
+    """Whether somebody follows the hand in a room, see `Capture.drain_moves`."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ResetHeading:
     """Take the heading anew, the hand lying flat now; of one sensor or, with None, of all."""
 
@@ -133,11 +152,13 @@ Order: TypeAlias = (
     | SetSubject
     | SetSensors
     | SetFilter
+    | SetTracker
     | StartTake
     | StopTake
     | Ask
     | NotePage
     | ShareSamples
+    | ShareMoves
     | ResetHeading
     | SetHeading
 )
@@ -162,6 +183,23 @@ class Newest:
     def ready(self) -> bool:
         """Whether a take can begin: the device is known and there."""
         return self.setup is not None and self.phase in (Phase.CONNECTING, Phase.STREAMING)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """What one chunk told: instants, and the readings that they were fused from.
+
+    Attributes:
+        arrival_ns: When it came, on the host's clock.
+        setup: What it was fused by.
+        motion: Its instants.
+        runs: Its readings, an instant of the motion each, as they were read.
+    """
+
+    arrival_ns: int
+    setup: Setup
+    motion: Motion
+    runs: tuple[ImuSamples, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from handstudio.pipeline import Motion
 from handstudio.process import MotionWriter, motion_folder
 from handstudio.recording.header import Header, Summary
 from handstudio.recording.take import open_take
+from handstudio.recording.tracker_message import Poses
 from handstudio.recording.writer import FLUSH_S, TakeWriter
 
 BACKLOG_LIMIT = 256 << 20  # bytes waiting for the disk before a recording counts as failed
@@ -38,7 +39,8 @@ def _motion_writer(path: Path, sensors: int) -> MotionWriter | None:
 
 
 class Recorder:
-    """Records one take; `put` and `put_motion` from the capture thread, the rest from anywhere.
+    """Records one take; `put` and `put_motion` from the capture thread, `put_poses` from the
+    tracker's, the rest from anywhere.
 
     Args:
         path: The file to become.
@@ -58,7 +60,7 @@ class Recorder:
         self.chunks = 0
         self.first_us: int | None = None  # device time of the take's first instant
         self._written = 0  # bytes; by the writer thread alone
-        self._queue: queue.SimpleQueue[_Chunk | Motion | _End] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[_Chunk | Motion | Poses | _End] = queue.SimpleQueue()
         self._writer = TakeWriter(path, header, first_state)
         self._motion = _motion_writer(path, len(header.setup.layout.sensors))
         self._thread = threading.Thread(target=self._run, name="take writer")
@@ -93,6 +95,11 @@ class Recorder:
             self.first_us = int(motion.time_us[0])
         if self.failure is None:
             self._queue.put(motion)
+
+    def put_poses(self, poses: Poses) -> None:
+        """Hand over what a tracker told; what comes after the end is not of the take."""
+        if self.failure is None and self.header.tracker is not None:
+            self._queue.put(poses)
 
     def stop(self, summary: Summary) -> None:
         """End the take; the file closes soon after, see `finished`."""
@@ -137,6 +144,8 @@ class Recorder:
                 case _Chunk(arrival_ns=arrival_ns, data=data):
                     self._writer.write(arrival_ns, data)
                     self._written += len(data)
+                case Poses():
+                    self._writer.write_poses(item)
                 case Motion():
                     self._append_motion(item)
                 case _End(summary=summary):

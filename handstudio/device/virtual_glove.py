@@ -17,18 +17,23 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from handstudio.device.lsl_outlet import LslOutlet
 from handstudio.device.wearer import Wearer
 from handstudio.errors import HandstudioError
+from handstudio.layout import glove
 from handstudio.recording.simulated import described, rehearse
 from handstudio.simulation.firmware import RATES_HZ, Firmware
 from handstudio.simulation.glove import Wire, WornGlove
 from handstudio.simulation.imperfections.strengths import parse
+from handstudio.simulation.streamed import STRENGTHS, Terminal
+
+DEFAULT_STREAM = "handstudio virtual tracker"
 
 _LONGEST_PAUSE_S = 0.1  # how long an order to stop may go unseen
 _SHORTEST_PAUSE_S = 0.001  # a USB device is asked once a millisecond too
@@ -56,11 +61,17 @@ class Line(Protocol):
         """Leave nothing behind."""
 
 
-def serve(line: Line, firmware: Firmware, stop: threading.Event, speed: float = 1.0) -> None:
+def serve(
+    line: Line,
+    firmware: Firmware,
+    stop: threading.Event,
+    speed: float = 1.0,
+    tracker: Streaming | None = None,
+) -> None:
     """Move bytes between a line and a firmware, in real time, until told to stop.
 
     Whatever is due is made, however late: the firmware's clock keeps pace with ours, or with
-    ``speed`` times ours, for tests.
+    ``speed`` times ours, for tests. A tracker beside it has the same clock.
     """
     began_ns = time.monotonic_ns()
 
@@ -82,7 +93,34 @@ def serve(line: Line, firmware: Firmware, stop: threading.Event, speed: float = 
         else:
             firmware.receive(heard)
         _send(line, firmware)
+        if tracker is not None:
+            tracker.tell(firmware.streams_since_us, now_us, speed)
         line.wait(_pause_s(firmware, now_us(), speed))
+
+
+@dataclass(frozen=True, slots=True)
+class Streaming:
+    """A virtual tracker's terminal, and the stream that its poses go to."""
+
+    terminal: Terminal
+    outlet: LslOutlet
+
+    def tell(self, since_us: int | None, now_us: Callable[[], int], speed: float) -> None:
+        """Send what was told until now, while the glove streams since an instant of its clock."""
+        if since_us is None:
+            return
+        for pose in self.terminal.due(now_us() - since_us):
+            self.outlet.tell(pose, (now_us() - since_us - pose.told_us) * 1e-6 / speed)
+
+
+def _tracker(asked: argparse.Namespace, worn: WornGlove) -> Streaming | None:
+    if not asked.tracker:
+        return None
+    sensor = glove(asked.side).drivers[asked.tracker]
+    terminal = Terminal(sensor, STRENGTHS[asked.tracker_errors], asked.seed)
+    worn.watched_by(terminal.saw)
+    name = asked.tracker_name or f"{DEFAULT_STREAM} {os.getpid()}"
+    return Streaming(terminal, LslOutlet(name, asked.tracker))
 
 
 def _send(line: Line, firmware: Firmware) -> None:
@@ -114,10 +152,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             side=asked.side,
             hand_length_m=asked.hand_length,
         )
+        worn = WornGlove(rehearsed.worn, rehearsed.trajectory)
+        tracker = _tracker(asked, worn)
     except HandstudioError as error:
         print(json.dumps({"problem": [str(error.what), str(error.remedy)]}), flush=True)
         raise SystemExit(1) from error
-    worn = WornGlove(rehearsed.worn, rehearsed.trajectory)
     told = described(rehearsed.subject, asked.seed, asked.rate, epoch)
     told = replace(told, name=asked.name) if asked.name else told
     wire = Wire(rehearsed.imperfections, rehearsed.seed)
@@ -125,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     firmware = Firmware(told, worn.read, asked.tx_buffer, performer=wearer.asked, wire=wire.carry)
     with closing(_open(asked)) as line:
         print(json.dumps({"address": line.address}), flush=True)
-        serve(line, firmware, stop, asked.speed)
+        serve(line, firmware, stop, asked.speed, tracker)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -149,6 +188,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--tx-buffer", type=int, default=4096, help="[bytes]")
     parser.add_argument("--name", default="", help="instead of who wears it")
     parser.add_argument("--epoch", type=int, help="of this start; random unless given")
+    parser.add_argument(
+        "--tracker", choices=("hand", "forearm"), help="stream a tracker's terminal there, by LSL"
+    )
+    parser.add_argument("--tracker-name", default="", help="of that stream")
+    parser.add_argument("--tracker-errors", choices=tuple(STRENGTHS), default="plain")
     parser.add_argument("--quit-with-parent", action="store_true", help="stop at end of input")
     return parser
 

@@ -34,6 +34,9 @@ _OPTIONS = (
     "name",
     "epoch",
     "speed",
+    "tracker",
+    "tracker-name",
+    "tracker-errors",
 )
 
 

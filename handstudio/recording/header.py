@@ -10,6 +10,7 @@ import msgspec
 from handstudio import __version__
 from handstudio.errors import LayoutError, TakeError
 from handstudio.health.record import TakeHealth
+from handstudio.recording.tracker_message import TrackerFacts
 from handstudio.setup import Setup
 
 PROFILE = "handstudio"
@@ -18,7 +19,10 @@ SUMMARY_RECORD = "handstudio.summary"
 STATE_ATTACHMENT = "first_state"
 WIRE_TOPIC = "/wire"
 SAMPLES_TOPIC = "/samples"
-FORMAT = 1
+TRACKER_TOPIC = "/tracker"
+FORMAT = 2
+"""The newest that is read. What is written says 2 only where a tracker is with it, so that
+versions before trackers read all else."""
 
 
 class Header(msgspec.Struct, frozen=True):
@@ -32,7 +36,8 @@ class Header(msgspec.Struct, frozen=True):
         kind: ``wire`` for bytes of a device, ``samples`` for imports.
         source: Address of the device, or the imported folder's name.
         software: Version of handstudio that recorded it.
-        format: Version of this layout of the file.
+        format: Version of this layout of the file: 1, or 2 with a tracker.
+        tracker: What was chosen as such; None: nothing.
     """
 
     name: str
@@ -42,7 +47,8 @@ class Header(msgspec.Struct, frozen=True):
     kind: Literal["wire", "samples"]
     source: str
     software: str = __version__
-    format: int = FORMAT
+    format: int = 1
+    tracker: TrackerFacts | None = None
 
 
 class Summary(msgspec.Struct, frozen=True):
@@ -57,6 +63,14 @@ class Summary(msgspec.Struct, frozen=True):
     clock_offset_ns: int | None = None  # host minus device clock, at the end
     clock_drift_ppm: float | None = None
     health: TakeHealth | None = None  # also absent in takes of before it was kept
+    poses: int = 0  # of a tracker
+
+
+def with_tracker(header: Header, tracker: TrackerFacts | None) -> Header:
+    """The header of a take that a tracker's poses go into."""
+    if tracker is None:
+        return header
+    return msgspec.structs.replace(header, tracker=tracker, format=2)
 
 
 def encode_header(header: Header, first_state: bytes) -> dict[str, str]:

@@ -18,7 +18,8 @@ from handstudio.recording.header import (
 )
 from handstudio.recording.naming import take_stem
 from handstudio.recording.notes import copy_notes
-from handstudio.recording.take import DAMAGE, records_until_damage
+from handstudio.recording.take import DAMAGE, Told, records_until_damage
+from handstudio.recording.tracker_message import decode_poses
 from handstudio.recording.writer import TakeWriter
 
 
@@ -51,6 +52,8 @@ def recover(path: Path) -> Recovered:
             if isinstance(record, Message):
                 writer.write(record.log_time, record.data)
                 first, last = first or record.log_time, record.log_time
+            elif isinstance(record, Told):
+                writer.write_poses(decode_poses(record.arrival_ns, record.data))
         writer.close()
     except BaseException:
         writer.discard()  # a copy of a part: the damaged file still has it all
@@ -60,7 +63,7 @@ def recover(path: Path) -> Recovered:
     return Recovered(target, writer.chunks, writer.bytes, duration)
 
 
-def _readable(path: Path) -> Iterator[McapRecord]:
+def _readable(path: Path) -> Iterator[McapRecord | Told]:
     try:
         with path.open("rb") as stream:
             yield from records_until_damage(stream)
@@ -75,7 +78,7 @@ def _readable(path: Path) -> Iterator[McapRecord]:
         ) from error
 
 
-def _beginning(records: Iterator[McapRecord], path: Path) -> tuple[Header, bytes]:
+def _beginning(records: Iterator[McapRecord | Told], path: Path) -> tuple[Header, bytes]:
     header, about = None, dict[str, str]()
     for record in records:
         if isinstance(record, Metadata) and record.name == HEADER_RECORD:

@@ -17,6 +17,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
+    Channel,
     Chunk,
     DataEnd,
     Footer,
@@ -37,6 +38,7 @@ from handstudio.recording.header import (
     PROFILE,
     STATE_ATTACHMENT,
     SUMMARY_RECORD,
+    TRACKER_TOPIC,
     Header,
     Summary,
     decode_header,
@@ -45,6 +47,7 @@ from handstudio.recording.header import (
 )
 from handstudio.recording.naming import UNFINISHED
 from handstudio.recording.samples_message import decode_samples
+from handstudio.recording.tracker_message import Poses, decode_poses, joined
 from handstudio.samples import Event, ImuSamples
 from handstudio.stream import EventStream
 
@@ -56,6 +59,14 @@ DAMAGE = (
     *(ValueError, EOFError, KeyError, MemoryError, OverflowError),
 )
 """What reading a damaged file may raise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A message of a tracker, `tracker_message`."""
+
+    arrival_ns: int
+    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +116,17 @@ class Take:
                 yield record.log_time, record.data
         if self.summary is not None and count != self.summary.chunks:
             raise _damaged(self.path, ValueError(f"{self.summary.chunks - count} chunks missing"))
+
+    def poses(self) -> Poses:
+        """What a tracker told meanwhile, as it came; nothing in a take without one.
+
+        Raises:
+            TakeError: the file is damaged.
+        """
+        if self.header.tracker is None:
+            return joined([])
+        told = (record for record in _records(self.path) if isinstance(record, Told))
+        return joined([decode_poses(one.arrival_ns, one.data) for one in told])
 
     def events(self, from_start: bool = False) -> Iterator[list[Event]]:
         """Events in the order they came, some seconds at a time; memory does not grow with length.
@@ -247,35 +269,37 @@ def unpack_first_state(data: bytes) -> FirstState:
     return FirstState(packed.stream, packed.pipeline)
 
 
-def records_until_damage(stream: BinaryIO) -> Iterator[McapRecord]:
+def records_until_damage(stream: BinaryIO) -> Iterator[McapRecord | Told]:
     """Records in order, checksums verified; chunks are followed by their messages, none missing.
+
+    What a tracker told is given as `Told`, so that no message is mistaken for bytes of the device.
 
     Raises:
         One of `DAMAGE`, where the file stops making sense.
     """
     reader = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT)
-    turn = 0
+    turns, trackers = dict[int, int](), set[int]()
     for record in reader.records:
-        messages = []
+        inside: list[McapRecord] = []
         match record:
             case Message():
                 raise ValueError("a message outside a chunk, where none was written")
             case Chunk():
-                messages = _messages(record)
+                inside = breakup_chunk(record, validate_crc=True)
         yield record
-        for message in messages:
-            if message.sequence != turn:
-                raise ValueError(f"message {message.sequence} where {turn} belongs")
-            turn += 1
-            yield message
+        for each in inside:
+            match each:
+                case Channel(id=channel, topic=topic) if topic == TRACKER_TOPIC:
+                    trackers.add(channel)
+                case Message(channel_id=channel, sequence=sequence):
+                    turn = turns.get(channel, 0)
+                    if sequence != turn:
+                        raise ValueError(f"message {sequence} where {turn} belongs")
+                    turns[channel] = turn + 1
+                    yield Told(each.log_time, each.data) if channel in trackers else each
 
 
-def _messages(chunk: Chunk) -> list[Message]:
-    records = breakup_chunk(chunk, validate_crc=True)
-    return [record for record in records if isinstance(record, Message)]
-
-
-def _records(path: Path) -> Iterator[McapRecord]:
+def _records(path: Path) -> Iterator[McapRecord | Told]:
     try:
         with path.open("rb") as stream:
             for record in records_until_damage(stream):

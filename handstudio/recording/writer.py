@@ -20,6 +20,7 @@ from handstudio.recording.header import (
     SAMPLES_TOPIC,
     STATE_ATTACHMENT,
     SUMMARY_RECORD,
+    TRACKER_TOPIC,
     WIRE_TOPIC,
     Header,
     Summary,
@@ -29,6 +30,7 @@ from handstudio.recording.header import (
 from handstudio.recording.held import hold
 from handstudio.recording.naming import UNFINISHED
 from handstudio.recording.samples_message import encode_samples
+from handstudio.recording.tracker_message import Poses, encode_poses
 from handstudio.samples import ImuSamples
 
 FLUSH_S = 0.25
@@ -55,6 +57,8 @@ class TakeWriter:
         self.path = path
         self.bytes = 0
         self.chunks = 0
+        self.poses = 0
+        self._pose_messages = 0
         self._unfinished = path.with_name(path.name + UNFINISHED)
         self._flushed_at = time.monotonic()
         self.start_utc_ns = header.start_utc_ns
@@ -76,10 +80,24 @@ class TakeWriter:
             self._writer.add_message(self._channel, arrival_ns, chunk, arrival_ns, self.chunks)
             self.bytes += len(chunk)
             self.chunks += 1
-            late = time.monotonic() - self._flushed_at >= FLUSH_S
-            if late or arrival_ns - self._flushed_until_ns >= FLUSH_S * 1e9:
-                self.flush()
-                self._flushed_until_ns = arrival_ns
+            self._flush_in_time(arrival_ns)
+
+    def write_poses(self, poses: Poses) -> None:
+        """Append what a tracker told, all of which arrived together; flushed as bytes are.
+
+        Only into a take whose header names a tracker.
+
+        Raises:
+            TakeError: the disk is full or gone. What was flushed before is safe.
+        """
+        if self._tracker is None or not len(poses):
+            return
+        with self._saying_what_to_do():
+            at_ns, data = int(poses.arrival_ns[0]), encode_poses(poses)
+            self._writer.add_message(self._tracker, at_ns, data, at_ns, self._pose_messages)
+            self.poses += len(poses)
+            self._pose_messages += 1
+            self._flush_in_time(at_ns)
 
     def write_samples(self, samples: ImuSamples, start_utc_ns: int) -> None:
         """Append imported samples."""
@@ -94,11 +112,12 @@ class TakeWriter:
     def close(self, summary: Summary | None = None) -> Path:
         """Finish the file and give it its name.
 
-        What the summary says of chunks and bytes is what was written here.
+        What the summary says of chunks, bytes and poses is what was written here.
         """
         with self._saying_what_to_do():
             if summary is not None:
-                told = msgspec.structs.replace(summary, chunks=self.chunks, bytes=self.bytes)
+                counted = {"chunks": self.chunks, "bytes": self.bytes, "poses": self.poses}
+                told = msgspec.structs.replace(summary, **counted)
                 self._writer.add_metadata(SUMMARY_RECORD, encode_summary(told))
             self._writer.finish()
             self._stream.flush()
@@ -148,7 +167,18 @@ class TakeWriter:
             )
             topic = WIRE_TOPIC if header.kind == "wire" else SAMPLES_TOPIC
             self._channel = self._writer.register_channel(topic, "application/octet-stream", 0)
+            self._tracker: int | None = None
+            if header.tracker is not None:
+                self._tracker = self._writer.register_channel(
+                    TRACKER_TOPIC, "application/octet-stream", 0
+                )
             self.flush()
+
+    def _flush_in_time(self, arrival_ns: int) -> None:
+        late = time.monotonic() - self._flushed_at >= FLUSH_S
+        if late or arrival_ns - self._flushed_until_ns >= FLUSH_S * 1e9:
+            self.flush()
+            self._flushed_until_ns = arrival_ns
 
     @contextlib.contextmanager
     def _saying_what_to_do(self) -> Iterator[None]:

@@ -118,6 +118,11 @@ class Firmware:
         due_us = min(self._health_due_us, self._temperature_due_us)
         return due_us if self._stream is None else min(due_us, self._stream.due_us)
 
+    @property
+    def streams_since_us(self) -> int | None:
+        """When its stream was started [µs since it was switched on]; None: it is stopped."""
+        return None if self._stream is None else self._stream.began_us
+
     def plugged_in(self) -> None:
         """A line begins anew: forget the old one, do not stream, say who is here."""
         self._stream: _Stream | None = None
@@ -260,7 +265,7 @@ class _Stream:
 
     def __init__(self, sensors: Sensors, began_us: int, rate_hz: int, block: int | None) -> None:
         self._sensors, self._size = sensors, block
-        self._began_us = began_us
+        self.began_us = began_us
         self._rate_hz = rate_hz
         self._ahead = self._block(began_us)
 
@@ -291,5 +296,5 @@ class _Stream:
         """The next instants: when each is due, and where its readings are."""
         size = self._size or max(1, self._rate_hz // 10)
         due_us = first_us + self._period_us * np.arange(size)
-        block = self._sensors(due_us - self._began_us, self._rate_hz)
+        block = self._sensors(due_us - self.began_us, self._rate_hz)
         return deque((due, block, at) for at, due in enumerate(due_us.tolist()))

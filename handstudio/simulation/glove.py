@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from handstudio.simulation.imperfections.readout import MPU9250
 from handstudio.simulation.imperfections.strengths import PLAIN, Imperfections
 from handstudio.simulation.line import LineState, line_of, passed
 from handstudio.simulation.motions.showcase import showcase
+from handstudio.simulation.moving import Moving
 from handstudio.simulation.subject import Subject, ideal_subject
 from handstudio.simulation.trajectory import Trajectory, turned_to
 from handstudio.simulation.worn import Worn, begin, sense, wear
@@ -50,11 +52,16 @@ class WornGlove:
         self._state = begin(worn)
         self._motion = motion
         self._asked: Trajectory | None = None
+        self._witness: Callable[[Int64[Array, " n"], Moving], None] = lambda _us, _sensors: None
         self._next_us, self._began_us = 0, 0  # on the time axis that never begins anew
 
     def turn_to(self, motion: Trajectory) -> None:
         """Perform something else from the next instants on. May be called from another thread."""
         self._asked = motion
+
+    def watched_by(self, witness: Callable[[Int64[Array, " n"], Moving], None]) -> None:
+        """Tell somebody beside where the sensors were at the instants that are read."""
+        self._witness = witness
 
     def read(self, time_us: Int64[Array, " n"], rate_hz: int) -> Readings:
         """Read the next instants, given in time since the motion began [µs]."""
@@ -67,6 +74,7 @@ class WornGlove:
             self._motion = turned_to(self._motion, float(ours_us[0]) * 1e-6, asked)
         sensed, self._state = sense(self._worn, self._state, self._motion, ours_us, rate_hz)
         self._next_us = int(ours_us[-1]) + 1
+        self._witness(time_us, sensed.sensors)
         return Readings(sensed.counts, sensed.fresh, sensed.answering, sensed.celsius[-1])
 
 

@@ -25,7 +25,11 @@ _PLACES = [f"_x_{unit}" for unit in _METRES]
 
 
 def tracks_of(
-    where: object, table: Mapping[str, Array], time_us: Int64[Array, " n"]
+    where: object,
+    table: Mapping[str, Array],
+    time_us: Int64[Array, " n"],
+    *,
+    refuse: bool = True,
 ) -> tuple[Track, ...]:
     """All terminals of some columns.
 
@@ -33,6 +37,7 @@ def tracks_of(
         where: What an error names: the file or stream.
         table: Columns by name.
         time_us: Instants of their rows.
+        refuse: What is no quaternion; else nothing was seen there, as in a stream that goes on.
 
     Raises:
         TrackError: there is no terminal in them, or one lacks columns.
@@ -47,10 +52,12 @@ def tracks_of(
         raise TrackError(
             "{where}: no column such as NAME_x_mm, so it has no terminal.", _GUIDE, where=where
         )
-    return tuple(_terminal(where, table, name, time_us) for name in names)
+    return tuple(_terminal(where, table, name, time_us, refuse) for name in names)
 
 
-def _terminal(where: object, table: Mapping[str, Array], name: str, time_us: Array) -> Track:
+def _terminal(
+    where: object, table: Mapping[str, Array], name: str, time_us: Array, refuse: bool
+) -> Track:
     unit = next(unit for unit in _METRES if f"{name}_x_{unit}" in table)
     t = _METRES[unit] * _columns(where, table, [f"{name}_{axis}_{unit}" for axis in "xyz"])
     if f"{name}_azimuth_deg" in table:
@@ -61,7 +68,7 @@ def _terminal(where: object, table: Mapping[str, Array], name: str, time_us: Arr
         q = _columns(where, table, [f"{name}_q{part}" for part in "wxyz"])
         length = np.linalg.norm(q, axis=1)
         wrong = np.abs(length - 1.0) > 0.05
-        if wrong.any():
+        if wrong.any() and refuse:
             row = int(np.argmax(wrong))
             raise TrackError(
                 "{where}, row {row}: the quaternion of {name} has a length of {length:.3f}.",
@@ -71,7 +78,7 @@ def _terminal(where: object, table: Mapping[str, Array], name: str, time_us: Arr
                 name=name,
                 length=float(length[row]),
             )
-        q = q / length[:, None]
+        q = q / np.where(wrong, np.nan, length)[:, None]
     seen = np.isfinite(t).all(axis=1) & np.isfinite(q).all(axis=1)
     quality = table.get(f"{name}_quality", np.ones(len(t)))
     quality = np.where(seen, np.clip(np.nan_to_num(quality), 0.0, 1.0), 0.0)

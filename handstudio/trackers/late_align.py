@@ -39,6 +39,8 @@ class Alignment:
         q_room_world: The world in the room.
         correlation: Of speeds of turning, 0 to 1: whether the two sit on the same thing.
         residual_rad: By how much attitudes differ afterwards, root mean square.
+        second_rad: By how much it turned about a second axis within a quarter of a second, root
+            mean square: the less, the worse the mounting is known.
     """
 
     delay_s: float
@@ -46,6 +48,12 @@ class Alignment:
     q_room_world: Float[Array, "4"]
     correlation: float
     residual_rad: float
+    second_rad: float = 1.0
+
+    @property
+    def doubt(self) -> float:
+        """What an alignment by another stretch is compared by: the less, the better it is known."""
+        return self.residual_rad / self.second_rad
 
 
 def align(
@@ -86,9 +94,9 @@ def align(
             found=correlation,
         )
     sensor, told = (sensor_s, q_world_sensor), (told_s, q_told)
-    q_mount = _mount(sensor, told, delay, track.name)
+    q_mount, _ = _mount(sensor, told, delay, track.name)
     delay = _refined(sensor, told, delay, q_mount)
-    q_mount = _mount(sensor, told, delay, track.name)
+    q_mount, second = _mount(sensor, told, delay, track.name)
     inside = _inside(sensor_s, told_s - delay)
     q_sensor = attitude_at(sensor_s, q_world_sensor, told_s[inside] - delay)
     q_told = q_told[inside]
@@ -96,7 +104,7 @@ def align(
     q_room_world = _mean(q_each)
     off = so3.angle_between(q_each, q_room_world)
     return Alignment(
-        delay, q_mount, q_room_world, correlation, float(np.sqrt(np.mean(np.square(off))))
+        delay, q_mount, q_room_world, correlation, float(np.sqrt(np.mean(np.square(off)))), second
     )
 
 
@@ -190,8 +198,11 @@ def _turns(sensor: _Attitudes, told: _Attitudes, delay: float) -> tuple[Array, A
     return seen, felt, first
 
 
-def _mount(sensor: _Attitudes, told: _Attitudes, delay: float, name: str) -> Array:
-    """How the terminal sits: rotations of both over a while are about the same axes."""
+def _mount(sensor: _Attitudes, told: _Attitudes, delay: float, name: str) -> tuple[Array, float]:
+    """How the terminal sits: rotations of both over a while are about the same axes.
+
+    And by how much it turned about a second one.
+    """
     seen, felt, _ = _turns(sensor, told, delay)
     enough = np.linalg.norm(felt, axis=-1) > _LEAST_TURN
     a, b = felt[enough], seen[enough]
@@ -203,7 +214,7 @@ def _mount(sensor: _Attitudes, told: _Attitudes, delay: float, name: str) -> Arr
             name=name,
         )
     signs = np.array([1.0, 1.0, np.linalg.det(u @ vt)])
-    return np.asarray(so3.from_matrix((u * signs) @ vt))
+    return np.asarray(so3.from_matrix((u * signs) @ vt)), float(np.sqrt(size[1] / len(a)))
 
 
 def _refined(sensor: _Attitudes, told: _Attitudes, delay: float, q_mount: Array) -> float:

@@ -96,7 +96,7 @@ def test_sensors_without_an_entry_stay_as_they_are() -> None:
     assert corrected(samples(), calibration(errors("elsewhere", 1)[0]), NAMES) == samples()
 
 
-def test_a_magnetometer_without_an_entry_stays_as_it_is() -> None:
+def test_a_magnetometer_without_an_entry_staysas_it_is() -> None:
     entry = msgspec.structs.replace(errors("SN2", 1)[0], mag_matrix=None, mag_bias=None)
     assert np.array_equal(corrected(samples(), calibration(entry), NAMES).mag, samples().mag)
 

@@ -81,7 +81,7 @@ def test_a_left_hand_mirrors_a_right_one():
     np.testing.assert_allclose(b.t_world_tip, a.t_world_tip * [-1.0, 1.0, 1.0], atol=1e-15)
 
 
-def test_the_flat_hand_is_as_long_as_it_is_said_to_be():
+def test_the_flat_hand_is_as_longas_it_is_said_to_be():
     skeleton = nominal_skeleton("right", 0.200)
     q = np.tile(so3.IDENTITY, (len(SEGMENTS), 1))
     pose = posed(skeleton, q)

@@ -80,7 +80,7 @@ def test_at_most_four_bones_share_a_point_and_share_all_of_it() -> None:
 
 
 @sides
-def test_bound_as_it_is_nothing_moves(side: HandSide) -> None:
+def test_boundas_it_is_nothing_moves(side: HandSide) -> None:
     mesh = skinned(nominal_skeleton(side))
     np.testing.assert_allclose(mesh.moved(mesh.bound), mesh.vertices, atol=1e-12)
 

@@ -195,7 +195,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 
 def test_a_take_of_a_newer_format_is_not_recovered_into_an_old_one(tmp_path, header, chunks):
-    writer = TakeWriter(tmp_path / "new.mcap", msgspec.structs.replace(header, format=2))
+    writer = TakeWriter(tmp_path / "new.mcap", msgspec.structs.replace(header, format=3))
     writer.write(*chunks[0])
     path = writer.close()
     with pytest.raises(TakeError, match="Update handstudio"):

@@ -186,9 +186,9 @@ def test_a_file_of_our_profile_without_a_header_is_no_take(tmp_path):
 
 
 def test_a_take_of_a_newer_format_asks_for_an_update(tmp_path, header):
-    newer = encode_header(msgspec.structs.replace(header, format=2), b"")
+    newer = encode_header(msgspec.structs.replace(header, format=3), b"")
     path = mcap(tmp_path / "new.mcap", PROFILE, {HEADER_RECORD: newer})
-    with pytest.raises(TakeError, match=r"format 2; this version reads up to 1\.\nUpdate"):
+    with pytest.raises(TakeError, match=r"format 3; this version reads up to 2\.\nUpdate"):
         open_take(path)
 
 

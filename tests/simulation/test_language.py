@@ -42,7 +42,7 @@ def test_a_label_of_a_take_is_one_name():
     assert said("index_mcp:flexion~slow") == [[("index_mcp:flexion", "", ("slow",), 1)]]
 
 
-def test_what_stands_in_quotes_is_left_as_it_is():
+def test_what_stands_in_quotes_is_leftas_it_is():
     assert said('rest:"60+&~"+rest: 5 ') == [
         [("rest", "60+&~", (), 1)],
         [("rest", "5", (), 1)],

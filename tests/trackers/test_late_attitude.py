@@ -98,7 +98,7 @@ def test_a_tracker_that_was_put_elsewhere_is_believed_again_after_a_second() -> 
     assert _rms(found.q_room_sensor, so3.multiply(moved, q_true), slice(550, None)) < 0.03
 
 
-def test_a_tracker_upside_down_from_the_start_is_followed_as_it_is() -> None:
+def test_a_tracker_upside_down_from_the_start_is_followedas_it_is() -> None:
     time_us, gyr, track, q_true = _watched(4.0)
     over = so3.exp(np.array([np.pi, 0.0, 0.0]))
     track = replace(track, q_room_terminal=so3.multiply(over, track.q_room_terminal))
