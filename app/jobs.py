@@ -11,7 +11,6 @@ from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import TypeAlias
 
-from app.found import Found, found_in
 from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
@@ -20,9 +19,10 @@ from handstudio.errors import HandstudioError
 from handstudio.export.export import export
 from handstudio.export.formats import format_named
 from handstudio.export.part import Content, Processed, Window
+from handstudio.finds import Found, finds
 from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured, measure
-from handstudio.process import kept_motion, process
+from handstudio.process import process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
 from handstudio.signals import signals
@@ -97,7 +97,7 @@ class Jobs:
         return self._pool.submit(_report, path, window, setup, beside, language)
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
-        """Look for what was written and grasped in the motion of a take, where that is kept."""
+        """Look for what was written and grasped in a take."""
         self._reset()
         return self._pool.submit(_find, path, setup)
 
@@ -227,8 +227,7 @@ def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, lan
 
 
 def _find(path: Path, setup: Setup) -> Found:
-    motion = kept_motion(open_take(path), setup)
-    return Found() if motion is None else found_in(setup, motion)
+    return finds(open_take(path), setup, _tell)
 
 
 def _solve(

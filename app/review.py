@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from app.comparison import Comparison, compared, seconds_of
-from app.found import Found
 from app.seen import Choice, Seen, seen
 from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
+from handstudio.finds import Found
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.recording.notes import Notes

@@ -11,6 +11,7 @@ from app.channels import OVERVIEW, SIGNALS, sets_of
 from app.review import Review
 from app.seen import Choice
 from app.workshop import Workshop
+from handstudio.finds import kept_finds
 from handstudio.pipeline import Motion
 from handstudio.process import kept_motion
 from handstudio.recording.take import Take, open_take
@@ -135,15 +136,18 @@ class Reviewer:
 
     def _ordered(self, review: Review) -> Review:
         """With what is kept of signals, stretches and finds; what is not is ordered, once."""
-        take, signals, stretches = review.take, review.signals, review.stretches
+        take, signals = review.take, review.signals
+        stretches, found = review.stretches, review.found
         if review.choice.name == SIGNALS and signals is None:
             signals = kept_signals(take)
         if stretches is None:
             stretches = kept_survey(take, review.setup)
+        if found is None:
+            found = kept_finds(take, review.setup)
         lacking = {
             "signals": review.choice.name == SIGNALS and signals is None,
             "stretches": stretches is None,
-            "found": review.found is None,
+            "found": found is None,
         }
         new = {name for name, lacks in lacking.items() if lacks} - review.ordered
         if "signals" in new:
@@ -152,7 +156,8 @@ class Reviewer:
             self.workshop.look_through(take, review.used)
         if "found" in new:
             self.workshop.find(take, review.setup)
-        return replace(review, signals=signals, stretches=stretches, ordered=review.ordered | new)
+        ordered = review.ordered | new
+        return replace(review, signals=signals, stretches=stretches, found=found, ordered=ordered)
 
     def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
         motion = kept_motion(take, setup)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.found import Found
 from app.intents import Export
 from app.jobs import Beside, Jobs
 from app.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_into
@@ -19,6 +18,7 @@ from app.words import _, language
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.finds import Found
 from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion

@@ -12,7 +12,6 @@ import pytest
 
 from app import intents
 from app import review as reviewing
-from app.found import Found, found_in
 from app.jobs import Beside, Jobs
 from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
@@ -26,6 +25,7 @@ from handstudio.device.recorder import Recorder
 from handstudio.export.export import export
 from handstudio.export.formats import FORMATS
 from handstudio.export.part import Content, Processed, Window
+from handstudio.finds import Found, finds
 from handstudio.measure import Measured, measure
 from handstudio.pipeline import Motion
 from handstudio.process import process
@@ -93,7 +93,7 @@ class PromptJobs:
         return done(lambda: survey(open_take(path), setup))
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
-        return done(lambda: found_in(setup, process(open_take(path), setup)))
+        return done(lambda: finds(open_take(path), setup))
 
     def signals(self, path: Path) -> Future[None]:
         return done(lambda: signals(open_take(path)))

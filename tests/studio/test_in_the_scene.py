@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from app import review as reviewing
-from app.found import Found
 from app.review import Review
 from app.state import State
 from app.views.held import held_view
@@ -20,6 +19,7 @@ from handstudio.analysis.pen_tip import Plane
 from handstudio.analysis.take_grasps import TakenGrasp
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
+from handstudio.finds import Found
 from handstudio.hand.skeleton import SEGMENTS
 from handstudio.maths import so3
 from handstudio.recording.take import Take

@@ -15,7 +15,6 @@ from app import intents
 from app import review as reviewing
 from app.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
 from app.comparison import OF_TAKE
-from app.found import Found
 from app.jobs import Stopped
 from app.review import Review
 from app.review import opened as opened_review
@@ -30,6 +29,7 @@ from handstudio.analysis.take_grasps import TakenGrasp
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
+from handstudio.finds import Found
 from handstudio.process import kept_motion, process, process_head
 from handstudio.recording.notes import with_mark
 from handstudio.recording.simulated import rehearse, simulate
@@ -368,3 +368,13 @@ def until(studio: Studio, intent: intents.Intent, holds: Callable[[State], objec
         time.sleep(0.01)
         state = studio.tick(TICK_S)
     raise AssertionError("it did not happen")
+
+
+def test_grasps_and_writing_are_searched_for_at_the_first_opening_alone(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened(studio, path)
+    studio.tick(TICK_S)
+    monkeypatch.setattr(studio._workshop, "find", None)
+    after(studio, intents.ShowLive())
+    assert opened(studio, path).found is not None
