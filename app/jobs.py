@@ -28,6 +28,7 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.way import find_way
 from handstudio.wizards.joint_course import JointCourse, Poses
 
 Beside: TypeAlias = tuple[Path | None, Path | None]
@@ -105,6 +106,11 @@ class Jobs:
         """Find the stretches of a take's motion that want a second look."""
         self._reset()
         return self._pool.submit(_survey, path, setup)
+
+    def find_way(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        """Find the way of a take's hand in a tracker's room: `kept_way` then has it."""
+        self._reset()
+        return self._pool.submit(_find_way, path, setup)
 
     def signals(self, path: Path) -> Future[None]:
         """Write what the sensors of a take told: choosing it then finds it."""
@@ -184,6 +190,10 @@ def _process(path: Path, setup: Setup | None) -> None:
 
 def _survey(path: Path, setup: Setup | None) -> tuple[Stretch, ...]:
     return survey(open_take(path), setup, _tell)
+
+
+def _find_way(path: Path, setup: Setup | None) -> None:
+    find_way(open_take(path), setup, _tell)
 
 
 def _signals(path: Path) -> None:

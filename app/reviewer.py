@@ -18,6 +18,7 @@ from handstudio.recording.take import Take, open_take
 from handstudio.setup import Setup
 from handstudio.signals import kept_signals
 from handstudio.survey import kept_survey
+from handstudio.way import has_track, kept_way
 
 
 @dataclass
@@ -137,17 +138,21 @@ class Reviewer:
     def _ordered(self, review: Review) -> Review:
         """With what is kept of signals, stretches and finds; what is not is ordered, once."""
         take, signals = review.take, review.signals
-        stretches, found = review.stretches, review.found
+        stretches, found, way = review.stretches, review.found, review.way
         if review.choice.name == SIGNALS and signals is None:
             signals = kept_signals(take)
         if stretches is None:
             stretches = kept_survey(take, review.setup)
         if found is None:
             found = kept_finds(take, review.setup)
+        tracked = has_track(take, review.setup)
+        if way is None and tracked:
+            way = kept_way(take, review.setup)
         lacking = {
             "signals": review.choice.name == SIGNALS and signals is None,
             "stretches": stretches is None,
             "found": found is None,
+            "way": way is None and tracked,
         }
         new = {name for name, lacks in lacking.items() if lacks} - review.ordered
         if "signals" in new:
@@ -156,8 +161,10 @@ class Reviewer:
             self.workshop.look_through(take, review.used)
         if "found" in new:
             self.workshop.find(take, review.setup)
-        ordered = review.ordered | new
-        return replace(review, signals=signals, stretches=stretches, found=found, ordered=ordered)
+        if "way" in new:
+            self.workshop.find_way(take, review.used)
+        review = replace(review, stretches=stretches, found=found, way=way)
+        return replace(review, signals=signals, ordered=review.ordered | new)
 
     def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
         motion = kept_motion(take, setup)

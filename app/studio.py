@@ -45,6 +45,7 @@ from app.workshop import (
     Trimmed,
     Uncomputed,
     Unseen,
+    WayFound,
     Workshop,
     Written,
 )
@@ -699,7 +700,7 @@ class Studio:
                     self._ask_of_review()
                 case Surveyed(take=take, setup=setup, stretches=found) if self._is_open(take):
                     self._look_at(setup or take.header.setup, found)
-                case Written(take=take) if self._is_open(take):
+                case Written(take=take) | WayFound(take=take) if self._is_open(take):
                     self._ask_of_review()
                 case Previewed(take=take, motion=motion):
                     review = self._reviewer.head(take, motion)
@@ -723,7 +724,8 @@ class Studio:
                         self._bring(reviewing.settled(self.state.review))
                 case Unseen(take=take, what=what, error=error):
                     self._tell_why(error)
-                    self._forget_order(take, what)
+                    if what != "way" or isinstance(error, Stopped):
+                        self._forget_order(take, what)  # what the track says stays as it is
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)

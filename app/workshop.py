@@ -83,6 +83,13 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
+class WayFound:
+    """The way of the hand of this take in a tracker's room is there now."""
+
+    take: Take
+
+
+@dataclass(frozen=True, slots=True)
 class Trimmed:
     """A part of a take is a take of its own."""
 
@@ -143,7 +150,7 @@ class OfJoint:
 
 
 Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
-    FoundIn | Trimmed | Added | Exported | Gathered | Solved | OfJoint
+    FoundIn | WayFound | Trimmed | Added | Exported | Gathered | Solved | OfJoint
 )
 
 
@@ -218,6 +225,12 @@ class Workshop:
 
         future, fail = self.jobs.survey(take.path, setup), _unseen(take, "stretches")
         self._pending.append(_Pending(future, use, words, fail))
+
+    def find_way(self, take: Take, setup: Setup | None) -> None:
+        """The way of the hand in a tracker's room, by a motion that is there already."""
+        words = _("Finding the place of {name} in the room").format(name=take.path.stem)
+        future, fail = self.jobs.find_way(take.path, setup), _unseen(take, "way")
+        self._pending.append(_Pending(future, lambda _result: WayFound(take), words, fail))
 
     def write_signals(self, take: Take) -> None:
         """What the sensors of a take told."""

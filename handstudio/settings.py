@@ -37,6 +37,7 @@ class Shown(msgspec.Struct, frozen=True):
     sensors: bool = True
     axes: bool = False
     labels: bool = False
+    room: bool = True  # where a take knows where in one the hand was
 
 
 class Settings(msgspec.Struct, frozen=True):

@@ -39,6 +39,7 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.way import find_way
 from handstudio.wizards.joint_course import JointCourse, Poses
 
 TICK_S = 0.016
@@ -94,6 +95,9 @@ class PromptJobs:
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
         return done(lambda: finds(open_take(path), setup))
+
+    def find_way(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        return done(lambda: find_way(open_take(path), setup))
 
     def signals(self, path: Path) -> Future[None]:
         return done(lambda: signals(open_take(path)))
