@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 
 from handstudio.arrays import Array
 from handstudio.maths import so3
@@ -115,6 +115,13 @@ def kept_way(take: Take, setup: Setup | None = None) -> Way | None:
     return Way(rows, low, high)
 
 
+def last_known(known: Bool[Array, " n"]) -> Int64[Array, " n"]:
+    """Of every instant the last known one up to it; before the first known one that one."""
+    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+    out: Array = np.maximum(last, np.argmax(known))
+    return out
+
+
 def _filled(root: Root) -> Float[Array, "n 8"]:
     """The place before is held where none is known, at the beginning the first one."""
     count = len(root.time_us)
@@ -124,7 +131,7 @@ def _filled(root: Root) -> Float[Array, "n 8"]:
     if not known.any():
         return rows
     first = int(np.argmax(known))
-    held = np.maximum(np.maximum.accumulate(np.where(known, np.arange(count), 0)), first)
+    held = last_known(known)
     q_still_room = so3.conjugate(root.q_room_world[first])
     q = so3.multiply(q_still_room, root.q_room_world[held])
     rows[:, _Q] = q * np.where(q[:, :1] < 0.0, -1.0, 1.0)
