@@ -14,6 +14,7 @@ from typing import TypeAlias
 from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.export import export
@@ -84,18 +85,32 @@ class Jobs:
         return self._pool.submit(_export, path, name, content, window, setup)
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
     ) -> Future[Measured]:
         """Measure a part of a take, and compare it."""
         self._reset()
-        return self._pool.submit(_measure, path, window, setup, beside)
+        return self._pool.submit(_measure, path, window, setup, beside, tuple(bands))
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        *,
+        bands: Sequence[Band],
+        language: str,
     ) -> Future[Path]:
         """Write a report of a part of a take, beside it."""
         self._reset()
-        return self._pool.submit(_report, path, window, setup, beside, language)
+        return self._pool.submit(
+            _report, path, window, setup, beside, bands=tuple(bands), language=language
+        )
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
         """Look for what was written and grasped in a take."""
@@ -215,14 +230,30 @@ def _export(
     return export(source, target, chosen, content=kind, window=window, progress=_tell)
 
 
-def _measure(path: Path, window: Window, setup: Setup | None, beside: Beside) -> Measured:
+def _measure(
+    path: Path, window: Window, setup: Setup | None, beside: Beside, bands: tuple[Band, ...]
+) -> Measured:
     earlier, other = (None if one is None else open_take(one) for one in beside)
     return measure(
-        open_take(path), setup, window, earlier=earlier, other_side=other, progress=_tell
+        open_take(path),
+        setup,
+        window,
+        earlier=earlier,
+        other_side=other,
+        bands=bands,
+        progress=_tell,
     )
 
 
-def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, language: str) -> Path:
+def _report(
+    path: Path,
+    window: Window,
+    setup: Setup | None,
+    beside: Beside,
+    *,
+    bands: tuple[Band, ...],
+    language: str,
+) -> Path:
     earlier, other = (None if one is None else open_take(one) for one in beside)
     made = report_of(
         open_take(path),
@@ -230,6 +261,7 @@ def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, lan
         window,
         earlier=earlier,
         other_side=other,
+        bands=bands,
         language=language,
         progress=_tell,
     )

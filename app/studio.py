@@ -68,6 +68,7 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.measure import band_from, bands_with
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
 from handstudio.recording import notes as noting
@@ -313,7 +314,7 @@ class Studio:
                 "A take is being computed or exported.", "Wait until it is done, or cancel it."
             )
 
-    def _prefer(self, intent: intents.Intent) -> bool:
+    def _prefer(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
         """Settings; False: it is about something else."""
         change, shown = self._change, self.store.settings.shown
         match intent:
@@ -339,6 +340,8 @@ class Studio:
                 change(language=language)
                 self.language = None
                 self._speak(())
+            case intents.AddPosture() | intents.RemovePosture():
+                self._change_postures(intent)
             case intents.SetShown(part=part, on=on):
                 change(shown=msgspec.structs.replace(shown, **{part: on}))
             case intents.ToggleShown(part=part):
@@ -347,6 +350,14 @@ class Studio:
             case _:
                 return False
         return True
+
+    def _change_postures(self, intent: intents.AddPosture | intents.RemovePosture) -> None:
+        """What was measured without the new one is measured anew."""
+        kept = [band for band in self.store.settings.postures if band.name != intent.name.strip()]
+        if isinstance(intent, intents.AddPosture):
+            kept.append(band_from(intent.name, intent.angle, intent.above, intent.below))
+        self._change(postures=tuple(kept))
+        self._compare()
 
     def _move(self, move: intents.Intent) -> None:  # noqa: PLR0912 - a list
         review = self.state.review
@@ -626,11 +637,14 @@ class Studio:
         if review is None:
             return
         part, beside = Window(review.in_s, review.out_s), (review.earlier, review.other_side)
+        bands = bands_with(self.store.settings.postures)
         match order:
             case intents.MeasureHand():
-                self._workshop.measure(review.take, part, review.used, beside)
+                self._workshop.measure(review.take, part, review.used, beside, bands)
             case intents.MakeReport(page=page):
-                self._workshop.report(review.take.path, part, page, review.used, beside)
+                self._workshop.report(
+                    review.take.path, part, page, review.used, beside, bands=bands
+                )
 
     def _trim(self, name: str) -> None:
         review = self.state.review

@@ -15,6 +15,7 @@ from app.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_in
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
@@ -276,10 +277,17 @@ class Workshop:
         future = self.jobs.export(path, order.format, order.content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
-    def measure(self, take: Take, window: Window, setup: Setup | None, beside: Beside) -> None:
+    def measure(
+        self,
+        take: Take,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
+    ) -> None:
         """A part of a take, by its own setup or another, against other takes."""
         words = _("Measuring {name}").format(name=take.path.stem)
-        future = self.jobs.measure(take.path, window, setup, beside)
+        future = self.jobs.measure(take.path, window, setup, beside, bands)
         self._pending.append(_Pending(future, lambda found: MeasuredPart(take, found), words))
 
     def report(
@@ -289,6 +297,8 @@ class Workshop:
         page: int,
         setup: Setup | None = None,
         beside: Beside = (None, None),
+        *,
+        bands: Sequence[Band],
     ) -> None:
         """A report of a part of a take, in the language that is spoken, for a page."""
 
@@ -296,7 +306,7 @@ class Workshop:
             return Exported(Download(page, written.name, written))
 
         words = _("Writing the report of {name}").format(name=path.stem)
-        future = self.jobs.report(path, window, setup, beside, language())
+        future = self.jobs.report(path, window, setup, beside, bands=bands, language=language())
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import msgspec
 import platformdirs
 
+from handstudio.analysis.posture_time import Band
 from handstudio.errors import HandstudioError, SettingsError
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide, HandType
 from handstudio.recording.atomic import BACKUP, write_atomically
@@ -60,6 +61,7 @@ class Settings(msgspec.Struct, frozen=True):
         plot_span_s: How much time live plots show.
         filter: Name of the live filter; empty: whatever suits the device.
         curves: Name of the set of curves that is plotted.
+        postures: Whose time is counted on the page besides that of the usual ones.
     """
 
     language: str = ""
@@ -78,6 +80,7 @@ class Settings(msgspec.Struct, frozen=True):
     plot_span_s: float = 10.0
     filter: str = ""
     curves: str = "overview"
+    postures: tuple[Band, ...] = ()
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from app.report.make import report_of, report_path, save_report
 from app.review import Review
 from app.state import State
 from app.studio import Studio
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
@@ -120,15 +121,29 @@ class PromptJobs:
         return done(lambda: export(source, target, chosen, content=content, window=window))
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
     ) -> Future[Measured]:
-        return done(lambda: measure(open_take(path), setup, window, **_opened(beside)))
+        take, others = open_take(path), _opened(beside)
+        return done(lambda: measure(take, setup, window, bands=bands, **others))
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        *,
+        bands: Sequence[Band],
+        language: str,
     ) -> Future[Path]:
         def work() -> Path:
-            made = report_of(open_take(path), setup, window, language=language, **_opened(beside))
+            asked = {"bands": bands, "language": language, **_opened(beside)}
+            made = report_of(open_take(path), setup, window, **asked)
             return save_report(made.html, report_path(path, language))
 
         return done(work)
