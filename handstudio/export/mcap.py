@@ -134,6 +134,7 @@ class _Recording:
         for index, name in enumerate(SEGMENTS):
             entity = message.entities.add(frame_id=name, id=name, frame_locked=True)
             entity.timestamp.CopyFrom(_stamp(now))
+            entity.lifetime.SetInParent()  # zero: for ever; foxglove's schemas want it said
             red, green, blue = (channel / 255.0 for channel in of_part(name))
             tip = tips(skeleton).get(index)
             carried = [skeleton.t_parent_joint[child] for child in CHILDREN[index]]
@@ -143,6 +144,8 @@ class _Recording:
                 bones.points.add(x=end[0], y=end[1], z=end[2])
             ball = entity.spheres.add()
             ball.pose.orientation.w = bones.pose.orientation.w = 1.0
+            for pose in (ball.pose, bones.pose):
+                pose.position.SetInParent()
             ball.size.x = ball.size.y = ball.size.z = _BALL_M
             for colour in (bones.color, ball.color):
                 colour.r, colour.g, colour.b, colour.a = red, green, blue, 1.0
