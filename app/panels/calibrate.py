@@ -140,7 +140,7 @@ class _PalmField:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._choice = gui.add_dropdown(
-            _("Palm"),
+            _("Palm blocks"),
             tuple(_palms()),
             hint=_("How the calibration divides the palm: hand types 3, 2 and 1"),
         )

@@ -48,7 +48,8 @@ class MeasuresFolder:
         with self._sheet.add_tab(_("Measures"), viser.Icon.RULER_MEASURE):
             self._full = gui.add_html("")
             self._close = gui.add_button(_("Close"), color=QUIET)
-        self._sheet.float(x=350.0, y=16.0, width=820.0, height=640.0)
+        # below the corner of the picture's menu, and no wider than what a page of 1024 px leaves
+        self._sheet.float(x=350.0, y=56.0, width=630.0, height=640.0)
         self._takes: dict[str, Path] = {}
         self._others: dict[str, Path] = {}
         self._shown: Measured | None = None
@@ -62,6 +63,11 @@ class MeasuresFolder:
         self._all.on_click(lambda _event: self._show_all())
         self._close.on_click(lambda _event: put(self._sheet, visible=False))
         self._report.on_click(lambda event: send(intents.MakeReport(page_of(event))))
+
+    @property
+    def sheet_is_open(self) -> bool:
+        """Whether all measures are read now."""
+        return self._sheet.visible
 
     def render(self, state: State) -> None:
         """Show what was measured."""

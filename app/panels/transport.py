@@ -90,10 +90,10 @@ class TransportPanel:
             ),
         )
 
-    def render(self, state: State) -> None:
-        """Show where in the take we are."""
+    def render(self, state: State, *, reading: bool) -> None:
+        """Show where in the take we are; ``reading``: a sheet of the page's own is in its place."""
         review = state.review
-        covered = sheet_is_open(state) or sheet_of(state) is not None  # it comes back afterwards
+        covered = reading or sheet_is_open(state) or sheet_of(state) is not None
         put(self._panel, visible=review is not None and not covered)
         if review is None:
             return

@@ -180,7 +180,7 @@ def _facts(take: Take, setup: Setup, visit: Visit, recorded: datetime) -> list[t
     length = 1e3 * (setup.subject or setup.hand).hand_length_m
     return [
         (_("Subject"), visit.subject),
-        (_("Hand"), sides[visit.side]),
+        (_("Which hand"), sides[visit.side]),
         (_("Hand length"), f"{length:.0f} mm"),
         (_("Visit"), visit.visit),
         (_("Take"), take.path.stem),

@@ -164,7 +164,7 @@ def _brief(row: Row) -> str:
             out.append(" ".join(filter(None, [f"{name}{_figure(measure)}{unit}"])))
             if kind == "tam":
                 out[-1] += f" {grade_word(measure.grade)}"
-    return ", ".join(out)
+    return ", ".join(dict.fromkeys(out))  # one reason for all is said once
 
 
 def _figure(measure: Measure) -> str:

@@ -75,7 +75,7 @@ def room_words(state: State) -> str:
         return ""
     if way.at(review.index).known:
         return _("in the tracker's room")
-    return _("place unknown: held where it was known")
+    return _("place unknown, held")
 
 
 def _way(review: Review | None, state: State) -> Way | None:

@@ -128,7 +128,7 @@ def test_in_a_room_the_hand_goes_where_the_tracker_saw_it_and_ink_stays(state: S
         there = stand_of(at(roomy, at_s)).t_still_elbow
         np.testing.assert_allclose(there, [0.0, away_m, 0.0], atol=0.002)  # turned as the picture
     assert caption_of(at(roomy, 2.0)).endswith("in the tracker's room")
-    assert caption_of(at(roomy, 6.0)).endswith("place unknown: held where it was known")
+    assert caption_of(at(roomy, 6.0)).endswith("place unknown, held")
     time_s, flat = np.linspace(1.0, 3.0, 9), np.linspace([-0.02, 0.0], [0.02, 0.01], 9)
     plane, axes = Plane(np.array([0.0, 0.0, 1.0]), 0.0), np.eye(3)[:2]
     wrote = Writing(
