@@ -34,6 +34,7 @@ from handstudio.process import kept_motion, process, process_head
 from handstudio.recording.notes import with_mark
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
+from handstudio.recording.take_track import track_path
 from handstudio.setup import Setup
 
 from .conftest import TICK_S, StillCapture, after
@@ -378,3 +379,17 @@ def test_grasps_and_writing_are_searched_for_at_the_first_opening_alone(
     monkeypatch.setattr(studio._workshop, "find", None)
     after(studio, intents.ShowLive())
     assert opened(studio, path).found is not None
+
+
+def test_a_track_that_cannot_be_read_is_told_once_and_the_hand_stays_at_its_elbow(
+    studio: Studio, path: Path
+) -> None:
+    track_path(path).write_bytes(b"no archive")
+    after(studio, intents.OpenTake(path))
+    told = [said.text for _ in range(4) for said in studio.tick(TICK_S).messages]
+    for name in ("index", "thumb"):
+        told += [said.text for said in after(studio, intents.ChooseCurves(name)).messages]
+        told += [said.text for said in studio.tick(TICK_S).messages]
+    assert len([text for text in told if "the track cannot be read" in text]) == 1
+    assert studio.state.review is not None
+    assert studio.state.review.way is None
