@@ -22,6 +22,7 @@ class InkNodes:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
+        self._root = server.scene.add_frame("/ink", show_axes=False)
         self._writing: Writing | None = None
         self._count = -1
         self._sheets: list[viser.MeshHandle] = []  # desk and page
@@ -32,6 +33,8 @@ class InkNodes:
         if view is None:
             self.clear()
             return
+        stand = view.stand
+        self._root.wxyz, self._root.position = stand.q_still_world, stand.t_still_elbow
         if view.writing is not self._writing:
             self.clear()
             self._writing = view.writing
@@ -55,7 +58,7 @@ class InkNodes:
         self, name: str, corners: Array, colour: tuple[int, int, int], opacity: float
     ) -> viser.MeshHandle:
         return self._server.scene.add_mesh_simple(
-            f"/hand/{name}",
+            f"/ink/{name}",
             corners,
             _FACES,
             color=colour,
@@ -70,5 +73,5 @@ class InkNodes:
             self._ink = None
         if len(lines):
             self._ink = self._server.scene.add_line_segments(
-                "/hand/ink", lines.astype(np.float32), _INK, thickness=_INK_M
+                "/ink/lines", lines.astype(np.float32), _INK, thickness=_INK_M
             )

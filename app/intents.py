@@ -440,6 +440,23 @@ class MeasureHand:
 
 
 @dataclass(frozen=True, slots=True)
+class AddPosture:
+    """Count the time in this posture too: an angle and its ends in degrees, as they are typed."""
+
+    name: str
+    angle: str
+    above: str
+    below: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemovePosture:
+    """Count it no more."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class MakeReport:
     """Write a report of the part that counts and send it to a page."""
 
@@ -607,6 +624,8 @@ Intent: TypeAlias = (
     | CompareSides
     | MeasureHand
     | MakeReport
+    | AddPosture
+    | RemovePosture
     | Smooth
     | Compare
     | FaceForward

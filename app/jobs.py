@@ -11,23 +11,25 @@ from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import TypeAlias
 
-from app.found import Found, found_in
 from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.solving import Answer, solve
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.export import export
 from handstudio.export.formats import format_named
 from handstudio.export.part import Content, Processed, Window
+from handstudio.finds import Found, finds
 from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured, measure
-from handstudio.process import kept_motion, process
+from handstudio.process import process
 from handstudio.recording.take import open_take
 from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.way import find_way
 from handstudio.wizards.joint_course import JointCourse, Poses
 
 Beside: TypeAlias = tuple[Path | None, Path | None]
@@ -83,21 +85,35 @@ class Jobs:
         return self._pool.submit(_export, path, name, content, window, setup)
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
     ) -> Future[Measured]:
         """Measure a part of a take, and compare it."""
         self._reset()
-        return self._pool.submit(_measure, path, window, setup, beside)
+        return self._pool.submit(_measure, path, window, setup, beside, tuple(bands))
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        *,
+        bands: Sequence[Band],
+        language: str,
     ) -> Future[Path]:
         """Write a report of a part of a take, beside it."""
         self._reset()
-        return self._pool.submit(_report, path, window, setup, beside, language)
+        return self._pool.submit(
+            _report, path, window, setup, beside, bands=tuple(bands), language=language
+        )
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
-        """Look for what was written and grasped in the motion of a take, where that is kept."""
+        """Look for what was written and grasped in a take."""
         self._reset()
         return self._pool.submit(_find, path, setup)
 
@@ -105,6 +121,11 @@ class Jobs:
         """Find the stretches of a take's motion that want a second look."""
         self._reset()
         return self._pool.submit(_survey, path, setup)
+
+    def find_way(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        """Find the way of a take's hand in a tracker's room: `kept_way` then has it."""
+        self._reset()
+        return self._pool.submit(_find_way, path, setup)
 
     def signals(self, path: Path) -> Future[None]:
         """Write what the sensors of a take told: choosing it then finds it."""
@@ -186,6 +207,10 @@ def _survey(path: Path, setup: Setup | None) -> tuple[Stretch, ...]:
     return survey(open_take(path), setup, _tell)
 
 
+def _find_way(path: Path, setup: Setup | None) -> None:
+    find_way(open_take(path), setup, _tell)
+
+
 def _signals(path: Path) -> None:
     signals(open_take(path), _tell)
 
@@ -205,14 +230,30 @@ def _export(
     return export(source, target, chosen, content=kind, window=window, progress=_tell)
 
 
-def _measure(path: Path, window: Window, setup: Setup | None, beside: Beside) -> Measured:
+def _measure(
+    path: Path, window: Window, setup: Setup | None, beside: Beside, bands: tuple[Band, ...]
+) -> Measured:
     earlier, other = (None if one is None else open_take(one) for one in beside)
     return measure(
-        open_take(path), setup, window, earlier=earlier, other_side=other, progress=_tell
+        open_take(path),
+        setup,
+        window,
+        earlier=earlier,
+        other_side=other,
+        bands=bands,
+        progress=_tell,
     )
 
 
-def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, language: str) -> Path:
+def _report(
+    path: Path,
+    window: Window,
+    setup: Setup | None,
+    beside: Beside,
+    *,
+    bands: tuple[Band, ...],
+    language: str,
+) -> Path:
     earlier, other = (None if one is None else open_take(one) for one in beside)
     made = report_of(
         open_take(path),
@@ -220,6 +261,7 @@ def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, lan
         window,
         earlier=earlier,
         other_side=other,
+        bands=bands,
         language=language,
         progress=_tell,
     )
@@ -227,8 +269,7 @@ def _report(path: Path, window: Window, setup: Setup | None, beside: Beside, lan
 
 
 def _find(path: Path, setup: Setup) -> Found:
-    motion = kept_motion(open_take(path), setup)
-    return Found() if motion is None else found_in(setup, motion)
+    return finds(open_take(path), setup, _tell)
 
 
 def _solve(

@@ -66,20 +66,18 @@ def course_camera(side: str, *, near: bool) -> Camera:
     return Camera(place * mirror, target * mirror, np.array([0.0, 0.0, 1.0]))
 
 
-def camera_for(view: View, skeleton: Skeleton | None, pose: Pose | None, yaw: float) -> Camera:
-    """The camera of a view for the hand as it is now, in the world that is drawn.
+def camera_for(view: View, skeleton: Skeleton | None, pose: Pose | None) -> Camera:
+    """The camera of a view for the hand as it is now, its pose in the world that is drawn.
 
     Without a hand every view is that of the desk.
     """
     if view is View.DESK or skeleton is None or pose is None:
         return Camera(np.array(DESK_PLACE), np.array(DESK_TARGET), np.array([0.0, 0.0, 1.0]))
     hand = SEGMENTS.index("hand")
-    q_picture_hand = so3.multiply(so3.about_z(yaw), pose.q_world_segment[hand])
-    ulnar, along, dorsal = so3.to_matrix(q_picture_hand).T
+    ulnar, along, dorsal = so3.to_matrix(pose.q_world_segment[hand]).T
     radial = -ulnar if skeleton.side == "right" else ulnar
     size = hand_length(skeleton)
-    wrist = so3.rotate(so3.about_z(yaw), pose.t_world_joint[hand])
-    target = wrist + 0.45 * size * along
+    target = pose.t_world_joint[hand] + 0.45 * size * along
     towards = {
         View.PALM: -dorsal,
         View.BACK: dorsal,

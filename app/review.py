@@ -10,17 +10,18 @@ import numpy as np
 from jaxtyping import Float
 
 from app.comparison import Comparison, compared, seconds_of
-from app.found import Found
 from app.seen import Choice, Seen, seen
 from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
 from handstudio.errors import TakeError
+from handstudio.finds import Found
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
 from handstudio.recording.notes import Notes
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 from handstudio.signals import Signals
+from handstudio.way import Way
 
 _NARROWEST_S = 0.2  # of time in the plots: a few instants
 _LEAD = 0.1  # share of the plots before the playhead, where it has played out of them
@@ -59,6 +60,7 @@ class Review:
     signals: Signals | None = None  # None: nobody has asked for them yet
     stretches: tuple[Stretch, ...] | None = None  # None: not known yet
     found: Found | None = None  # what was written and grasped; None: not known yet
+    way: Way | None = None  # in a tracker's room; None: there is none, or it is not known yet
     ordered: frozenset[str] = frozenset()  # which of these are on their way
     rest: Rest = "here"
 

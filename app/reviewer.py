@@ -11,12 +11,15 @@ from app.channels import OVERVIEW, SIGNALS, sets_of
 from app.review import Review
 from app.seen import Choice
 from app.workshop import Workshop
+from handstudio.finds import kept_finds
 from handstudio.pipeline import Motion
 from handstudio.process import kept_motion
 from handstudio.recording.take import Take, open_take
+from handstudio.rooted import track_key
 from handstudio.setup import Setup
 from handstudio.signals import kept_signals
 from handstudio.survey import kept_survey
+from handstudio.way import kept_way
 
 
 @dataclass
@@ -135,15 +138,22 @@ class Reviewer:
 
     def _ordered(self, review: Review) -> Review:
         """With what is kept of signals, stretches and finds; what is not is ordered, once."""
-        take, signals, stretches = review.take, review.signals, review.stretches
+        take, signals = review.take, review.signals
+        stretches, found, way = review.stretches, review.found, review.way
         if review.choice.name == SIGNALS and signals is None:
             signals = kept_signals(take)
         if stretches is None:
             stretches = kept_survey(take, review.setup)
+        if found is None:
+            found = kept_finds(take, review.setup)
+        tracked = track_key(take, review.setup) is not None
+        if way is None and tracked:
+            way = kept_way(take, review.setup)
         lacking = {
             "signals": review.choice.name == SIGNALS and signals is None,
             "stretches": stretches is None,
-            "found": review.found is None,
+            "found": found is None,
+            "way": way is None and tracked,
         }
         new = {name for name, lacks in lacking.items() if lacks} - review.ordered
         if "signals" in new:
@@ -152,7 +162,10 @@ class Reviewer:
             self.workshop.look_through(take, review.used)
         if "found" in new:
             self.workshop.find(take, review.setup)
-        return replace(review, signals=signals, stretches=stretches, ordered=review.ordered | new)
+        if "way" in new:
+            self.workshop.find_way(take, review.used)
+        review = replace(review, stretches=stretches, found=found, way=way)
+        return replace(review, signals=signals, ordered=review.ordered | new)
 
     def _motion_by(self, take: Take, setup: Setup) -> Motion | None:
         motion = kept_motion(take, setup)

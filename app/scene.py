@@ -24,6 +24,7 @@ from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton
 from handstudio.layout import Layout
 from handstudio.maths import so3
 from handstudio.settings import Shown
+from handstudio.way import Stand
 
 _FLOOR_M = -0.06
 _BOARD_ALONE_M = 0.05  # drawn size of a sensor where there is no hand
@@ -53,14 +54,14 @@ class Scene:
         self._halo = HaloNodes(server)
         self._boards = _BoardNodes(server)
         self._sensors: dict[str, viser.SceneNodeHandle] = {}
-        self._dark: bool | None = None
+        self._furnished: tuple[bool, float] | None = None
         self._label: viser.LabelHandle | None = None
         self._words = ""
         server.scene.set_up_direction("+z")
 
-    def render(self, view: HandView | SensorsView | None, yaw: float | None, shown: Shown) -> None:
-        """Show a hand, bare sensors, or nothing."""
-        self._root.wxyz = so3.about_z(yaw or 0.0)
+    def render(self, view: HandView | SensorsView | None, stand: Stand, shown: Shown) -> None:
+        """Show a hand where it stands, bare sensors, or nothing."""
+        self._root.wxyz, self._root.position = stand.q_still_world, stand.t_still_elbow
         match view:
             case HandView():
                 self._clear_sensors()
@@ -106,12 +107,12 @@ class Scene:
                 "/words", words, position=DESK_TARGET, font_screen_scale=1.3, anchor="center-center"
             )
 
-    def furnish(self, dark: bool) -> None:
-        """Floor, light and background of a dark or a light room."""
-        if dark == self._dark:
+    def furnish(self, dark: bool, floor_m: float) -> None:
+        """Floor, light and background of a dark or a light room; its floor may lie lower."""
+        if (dark, floor_m) == self._furnished:
             return
-        self._dark = dark
-        _furnish(self._server, dark)
+        self._furnished = dark, floor_m
+        _furnish(self._server, dark, floor_m)
 
     def aim(self, camera: Camera) -> None:
         """Point every page's camera, and those of the pages to come."""
@@ -450,7 +451,7 @@ def _tinted(colour: tuple[int, int, int], doubtful: bool, dead: bool) -> tuple[i
     return colours.pale(colour) if doubtful else colour
 
 
-def _furnish(server: viser.ViserServer, dark: bool) -> None:
+def _furnish(server: viser.ViserServer, dark: bool, floor_m: float) -> None:
     cell, section = _CELLS[dark]
     server.scene.add_grid(
         "/floor",
@@ -462,7 +463,7 @@ def _furnish(server: viser.ViserServer, dark: bool) -> None:
         cell_color=cell,
         section_color=section,
         fade_distance=1.6,
-        position=(0.0, 0.25, _FLOOR_M),
+        position=(0.0, 0.25, _FLOOR_M + floor_m),
         shadow_opacity=0.25 if dark else 0.12,
     )
     # dimmer than viser's own light, which bleaches the colours that tell fingers apart

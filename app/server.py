@@ -22,6 +22,7 @@ from app.views.course import ghost_view
 from app.views.held import held_view
 from app.views.joint import halo_of
 from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
+from app.views.room import floor_m, stand_of
 from app.views.written import trace_view
 from app.words import _
 
@@ -125,8 +126,8 @@ class Server:
 
     def _render_scene(self, state: State) -> None:
         view = scene_of(state)
-        self._scene.furnish(dark=state.settings.theme == "dark")
-        self._scene.render(view, state.yaw, state.settings.shown)
+        self._scene.furnish(state.settings.theme == "dark", floor_m(state))
+        self._scene.render(view, stand_of(state), state.settings.shown)
         ghost = ghost_view(state) or compared_ghost(state)
         self._scene.render_ghost(ghost, state.settings.shown)
         self._scene.render_trace(trace_view(state))
@@ -138,7 +139,8 @@ class Server:
         fixed = state.view is View.DESK
         turned = None if fixed else (state.yaw, isinstance(view, HandView))
         above = state.review is not None, state.joint.answer is not None
-        aimed = state.aimed, turned, looks_near(state), above
+        way = None if state.review is None else state.review.way
+        aimed = state.aimed, turned, looks_near(state), above, way, state.settings.shown.room
         if aimed != self._aimed or state.view is View.FOLLOW:
             self._aimed = aimed
             self._scene.aim(camera_of(state, view))

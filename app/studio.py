@@ -46,6 +46,7 @@ from app.workshop import (
     Trimmed,
     Uncomputed,
     Unseen,
+    WayFound,
     Workshop,
     Written,
 )
@@ -69,6 +70,7 @@ from handstudio.device.orders import (
 )
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.measure import band_from, bands_with
 from handstudio.protocol.commands import PERFORM
 from handstudio.protocol.packets import TIP_SENSOR, Command
 from handstudio.recording import notes as noting
@@ -331,7 +333,7 @@ class Studio:
                 "A take is being computed or exported.", "Wait until it is done, or cancel it."
             )
 
-    def _prefer(self, intent: intents.Intent) -> bool:
+    def _prefer(self, intent: intents.Intent) -> bool:  # noqa: PLR0912 - a list
         """Settings; False: it is about something else."""
         change, shown = self._change, self.store.settings.shown
         match intent:
@@ -357,6 +359,8 @@ class Studio:
                 change(language=language)
                 self.language = None
                 self._speak(())
+            case intents.AddPosture() | intents.RemovePosture():
+                self._change_postures(intent)
             case intents.SetShown(part=part, on=on):
                 change(shown=msgspec.structs.replace(shown, **{part: on}))
             case intents.ToggleShown(part=part):
@@ -365,6 +369,14 @@ class Studio:
             case _:
                 return False
         return True
+
+    def _change_postures(self, intent: intents.AddPosture | intents.RemovePosture) -> None:
+        """What was measured without the new one is measured anew."""
+        kept = [band for band in self.store.settings.postures if band.name != intent.name.strip()]
+        if isinstance(intent, intents.AddPosture):
+            kept.append(band_from(intent.name, intent.angle, intent.above, intent.below))
+        self._change(postures=tuple(kept))
+        self._compare()
 
     def _move(self, move: intents.Intent) -> None:  # noqa: PLR0912 - a list
         review = self.state.review
@@ -669,11 +681,14 @@ class Studio:
         if review is None:
             return
         part, beside = Window(review.in_s, review.out_s), (review.earlier, review.other_side)
+        bands = bands_with(self.store.settings.postures)
         match order:
             case intents.MeasureHand():
-                self._workshop.measure(review.take, part, review.used, beside)
+                self._workshop.measure(review.take, part, review.used, beside, bands)
             case intents.MakeReport(page=page):
-                self._workshop.report(review.take.path, part, page, review.used, beside)
+                self._workshop.report(
+                    review.take.path, part, page, review.used, beside, bands=bands
+                )
 
     def _trim(self, name: str) -> None:
         review = self.state.review
@@ -743,7 +758,7 @@ class Studio:
                     self._ask_of_review()
                 case Surveyed(take=take, setup=setup, stretches=found) if self._is_open(take):
                     self._look_at(setup or take.header.setup, found)
-                case Written(take=take) if self._is_open(take):
+                case Written(take=take) | WayFound(take=take) if self._is_open(take):
                     self._ask_of_review()
                 case Previewed(take=take, motion=motion):
                     review = self._reviewer.head(take, motion)
@@ -767,7 +782,8 @@ class Studio:
                         self._bring(reviewing.settled(self.state.review))
                 case Unseen(take=take, what=what, error=error):
                     self._tell_why(error)
-                    self._forget_order(take, what)
+                    if what != "way" or isinstance(error, Stopped):
+                        self._forget_order(take, what)  # what the track says stays as it is
                 case Exported(download=download):
                     self._tell(_("Exported {path}.").format(path=download.content))
                     self._send_file(download)

@@ -9,16 +9,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.found import Found
 from app.intents import Export
 from app.jobs import Beside, Jobs
 from app.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_into
 from app.solving import Answer
 from app.state import Download, Work
 from app.words import _, language
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
 from handstudio.export.part import Window
+from handstudio.finds import Found
 from handstudio.hand.skeleton import HandType
 from handstudio.measure import Measured
 from handstudio.pipeline import Motion
@@ -78,6 +79,13 @@ class Surveyed:
 @dataclass(frozen=True, slots=True)
 class Written:
     """What the sensors of this take told is there now."""
+
+    take: Take
+
+
+@dataclass(frozen=True, slots=True)
+class WayFound:
+    """The way of the hand of this take in a tracker's room is there now."""
 
     take: Take
 
@@ -143,7 +151,7 @@ class OfJoint:
 
 
 Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
-    FoundIn | Trimmed | Added | Exported | Gathered | Solved | OfJoint
+    FoundIn | WayFound | Trimmed | Added | Exported | Gathered | Solved | OfJoint
 )
 
 
@@ -219,6 +227,12 @@ class Workshop:
         future, fail = self.jobs.survey(take.path, setup), _unseen(take, "stretches")
         self._pending.append(_Pending(future, use, words, fail))
 
+    def find_way(self, take: Take, setup: Setup | None) -> None:
+        """The way of the hand in a tracker's room, by a motion that is there already."""
+        words = _("Finding the place of {name} in the room").format(name=take.path.stem)
+        future, fail = self.jobs.find_way(take.path, setup), _unseen(take, "way")
+        self._pending.append(_Pending(future, lambda _result: WayFound(take), words, fail))
+
     def write_signals(self, take: Take) -> None:
         """What the sensors of a take told."""
         words = _("Reading the signals of {name}").format(name=take.path.stem)
@@ -263,10 +277,17 @@ class Workshop:
         future = self.jobs.export(path, order.format, order.content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
-    def measure(self, take: Take, window: Window, setup: Setup | None, beside: Beside) -> None:
+    def measure(
+        self,
+        take: Take,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
+    ) -> None:
         """A part of a take, by its own setup or another, against other takes."""
         words = _("Measuring {name}").format(name=take.path.stem)
-        future = self.jobs.measure(take.path, window, setup, beside)
+        future = self.jobs.measure(take.path, window, setup, beside, bands)
         self._pending.append(_Pending(future, lambda found: MeasuredPart(take, found), words))
 
     def report(
@@ -276,6 +297,8 @@ class Workshop:
         page: int,
         setup: Setup | None = None,
         beside: Beside = (None, None),
+        *,
+        bands: Sequence[Band],
     ) -> None:
         """A report of a part of a take, in the language that is spoken, for a page."""
 
@@ -283,7 +306,7 @@ class Workshop:
             return Exported(Download(page, written.name, written))
 
         words = _("Writing the report of {name}").format(name=path.stem)
-        future = self.jobs.report(path, window, setup, beside, language())
+        future = self.jobs.report(path, window, setup, beside, bands=bands, language=language())
         self._pending.append(_Pending(future, use, words))
 
     def gather(self, make: Callable[[], bytes], page: int) -> None:

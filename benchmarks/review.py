@@ -26,7 +26,6 @@ import numpy as np
 import tyro
 
 from app import intents
-from app.found import found_in
 from app.jobs import Jobs
 from app.state import State
 from app.studio import Studio
@@ -35,6 +34,7 @@ from app.views.comparison import compared_ghost
 from app.views.page import caption_of, curves_of, scene_of
 from app.views.written import trace_picture, trace_view
 from handstudio.device.capture import Capture
+from handstudio.finds import found_in
 from handstudio.process import process
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take

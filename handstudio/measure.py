@@ -156,6 +156,32 @@ def band_of(text: str) -> Band:
     return Band(name.strip(), angle, above, below)
 
 
+def band_from(name: str, angle: str, above: str, below: str) -> Band:
+    """A posture of which every part was typed by itself; either end may be empty.
+
+    Raises:
+        TakeError: no end is a number of degrees, or the first is not the lesser one.
+    """
+    try:
+        least, most = (float(text) if text.strip() else None for text in (above, below))
+    except ValueError:
+        least = most = None
+    known = [end for end in (least, most) if end is not None]
+    if not known or not np.isfinite(known).all() or known != sorted(set(known)):
+        raise TakeError(
+            "From {above!r} to {below!r} is no range of degrees.",
+            "Give both ends as numbers, the lesser one first, or leave one empty.",
+            above=above,
+            below=below,
+        )
+    return Band(name.strip(), angle, least, most)
+
+
+def bands_with(own: Sequence[Band]) -> tuple[Band, ...]:
+    """The usual postures and one's own; of two of a name one's own counts."""
+    return tuple({band.name: band for band in (*DEFAULT_BANDS, *own)}.values())
+
+
 def _one(
     take: Take,
     setup: Setup | None,

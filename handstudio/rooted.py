@@ -202,20 +202,32 @@ def root_or_why(take: Take, setup: Setup, motion: Motion) -> Root | HandstudioEr
     Raises:
         TakeError: the take or its track cannot be read.
     """
-    added = load_track(take.path) if setup.layout.is_hand else None
-    if added is None and (take.header.tracker is None or not setup.layout.is_hand):
+    key = track_key(take, setup)
+    if key is None:
         return None
-    path = _place(take, setup, motion, "recorded" if added is None else track_hash(take.path))
+    path = _place(take, setup, motion, key)
     root = _opened(path, motion)
     if root is None:
         try:
-            kept = added or _as_recorded(take, setup, motion)
+            kept = load_track(take.path) or _as_recorded(take, setup, motion)
             root = _computed(take, setup, motion, kept)
         except (CalibrationError, TrackError) as error:
             root = error
         with suppress(OSError):  # it can be computed again
             _keep(path, root)
     return root
+
+
+def track_key(take: Take, setup: Setup) -> str | None:
+    """What tells the track of a take from another one; None: it has none, or no hand.
+
+    One that was added beside the take goes before the one that was recorded with it.
+    """
+    if not setup.layout.is_hand:
+        return None
+    if track_path(take.path).exists():
+        return track_hash(take.path)
+    return None if take.header.tracker is None else "recorded"
 
 
 def _as_recorded(take: Take, setup: Setup, motion: Motion) -> KeptTrack:

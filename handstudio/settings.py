@@ -18,6 +18,7 @@ from typing import Any, Literal
 import msgspec
 import platformdirs
 
+from handstudio.analysis.posture_time import Band
 from handstudio.errors import HandstudioError, SettingsError
 from handstudio.hand.skeleton import ADULT_HAND_LENGTH_M, HandSide, HandType
 from handstudio.recording.atomic import BACKUP, write_atomically
@@ -37,6 +38,7 @@ class Shown(msgspec.Struct, frozen=True):
     sensors: bool = True
     axes: bool = False
     labels: bool = False
+    room: bool = True  # where a take knows where in one the hand was
 
 
 class Settings(msgspec.Struct, frozen=True):
@@ -63,6 +65,7 @@ class Settings(msgspec.Struct, frozen=True):
             the virtual glove; empty: none.
         tracker_terminal: Which of its terminals; empty: the first.
         tracker_sensor: The sensor that sits on; empty: found from the motion.
+        postures: Whose time is counted on the page besides that of the usual ones.
     """
 
     language: str = ""
@@ -84,6 +87,7 @@ class Settings(msgspec.Struct, frozen=True):
     tracker: str = ""
     tracker_terminal: str = ""
     tracker_sensor: str = ""
+    postures: tuple[Band, ...] = ()
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {

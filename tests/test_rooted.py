@@ -29,10 +29,12 @@ from handstudio.recording.tracker_message import Poses, TrackerFacts
 from handstudio.recording.truth import load_truth
 from handstudio.recording.writer import TakeWriter
 from handstudio.rooted import aligned_track, root_of, root_or_why
+from handstudio.setup import smoothing
 from handstudio.simulation.imperfections.strengths import IDEAL
 from handstudio.trackers.late_align import attitude_at
 from handstudio.trackers.track import Track
 from handstudio.trim import trim
+from handstudio.way import _filled, find_way, kept_way
 
 ROOM = so3.about_z(1.1)
 ORIGIN = np.array([0.3, -0.2, 0.1])
@@ -129,6 +131,40 @@ def test_a_track_goes_where_its_take_goes(take, kept, tmp_path):
     parcel = pack(open_take(take), tmp_path / "tissue.take.zip")
     arrived = take_in(parcel, tmp_path / "other")
     assert load_track(arrived).facts == kept.facts
+
+
+def test_the_way_to_look_at_is_the_room_turned_upright_and_has_no_holes(take, motion, root):
+    find_way(open_take(take))
+    way = kept_way(open_take(take))
+    known = np.isfinite(root.t_room_elbow[:, 0])
+    assert 0 < known.sum() < len(known)  # before the tracker began nothing is known
+    stands = [way.at(i) for i in range(len(motion))]
+    assert [stand.known for stand in stands] == known.tolist()
+    q = np.array([stand.q_still_world for stand in stands])
+    t = np.array([stand.t_still_elbow for stand in stands])
+    assert np.isfinite(q).all()
+    assert np.isfinite(t).all()
+    first = np.argmax(known)
+    q_room_still, origin = root.q_room_world[first], root.t_room_elbow[first]
+    back = origin + so3.rotate(q_room_still, t[known])
+    np.testing.assert_allclose(back, root.t_room_elbow[known], atol=1e-6)
+    turned = so3.angle_between(so3.multiply(q_room_still, q[known]), root.q_room_world[known])
+    assert turned.max() < 1e-5
+    np.testing.assert_array_equal(t[:first], 0.0)
+    assert (way.low <= t.min(axis=0) + 1e-6).all()
+    assert isinstance(way.rows, np.memmap)
+    assert kept_way(open_take(take), smoothing(open_take(take).header.setup)) is None
+
+
+def test_where_the_place_is_lost_the_last_one_is_held(root):
+    lost = replace(root, t_room_elbow=root.t_room_elbow.copy())
+    at = np.argmax(np.isfinite(root.t_room_elbow[:, 0])) + 300
+    lost.t_room_elbow[at : at + 50] = np.nan
+    rows = _filled(lost)
+    np.testing.assert_array_equal(rows[at : at + 50, :7], np.tile(rows[at - 1, :7], (50, 1)))
+    assert rows[at : at + 50, 7].tolist() == [0.0] * 50
+    nowhere = _filled(replace(root, t_room_elbow=np.full_like(root.t_room_elbow, np.nan)))
+    assert np.isfinite(nowhere).all()
 
 
 def test_a_part_of_a_take_has_the_same_places(take, root):

@@ -47,11 +47,6 @@ class CalibratePanel:
         self._sheet = gui.add_html("")
         names = sorted(COURSES, key=_ORDER.index) if set(COURSES) <= set(_ORDER) else list(COURSES)
         self._rows = {name: _CourseRow(gui, send, name) for name in names}
-        self._palm = gui.add_dropdown(
-            _("Palm"),
-            tuple(_palms()),
-            hint=_("How the calibration divides the palm: hand types 3, 2 and 1"),
-        )
         self._none = gui.add_button(_("Use no calibration"), color=QUIET, visible=False)
         self._again = gui.add_button(_("Use the calibration again"), color=QUIET, visible=False)
         self._previous = gui.add_button(_("Use the calibration before"), color=QUIET, visible=False)
@@ -69,7 +64,6 @@ class CalibratePanel:
         self._joint = JointFolder(gui, send)
         self._step.on_update(typed(self._pick))
         self._redo.on_click(lambda _event: self._say_redo(send))
-        self._palm.on_update(typed(lambda palm: send(intents.SetHandType(_palms()[palm]))))
         self._by_itself.on_update(typed(lambda on: send(intents.Guide(GoByItself(on)))))
         self._reset.on_click(lambda _event: send(intents.ResetHeading(self._sensor())))
 
@@ -90,9 +84,7 @@ class CalibratePanel:
             self._render_steps(view.step_choices(guided.course), guided.course.index)
         stands = {stand.name: stand for stand in view.stands_of(state)}
         for name, row in self._rows.items():
-            row.render(None if on else stands.get(name), ready=_ready(state))
-        put(self._palm, visible=not on and view.palm_is_chosen(state))
-        put(self._palm, value=_palm(state.settings.hand_type))
+            row.render(None if on else stands.get(name), state)
         in_use = state.in_use
         put(self._none, visible=not on and in_use.subject is not None)
         put(self._again, visible=not on and in_use.none)
@@ -143,19 +135,40 @@ def _palm(hand_type: HandType) -> str:
 _ORDER = ("hand", "check", "quick_start", "sensors", "noise")
 
 
+class _PalmField:
+    """How the calibration of the hand divides the palm, where the glove leaves a choice."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        self._choice = gui.add_dropdown(
+            _("Palm blocks"),
+            tuple(_palms()),
+            hint=_("How the calibration divides the palm: hand types 3, 2 and 1"),
+        )
+        self._choice.on_update(typed(lambda palm: send(intents.SetHandType(_palms()[palm]))))
+
+    def render(self, state: State, *, begins: bool) -> None:
+        """There before the course begins."""
+        put(self._choice, visible=begins and view.palm_is_chosen(state))
+        put(self._choice, value=_palm(state.settings.hand_type))
+
+
 class _CourseRow:
     """One course: what it is for, and the buttons to begin it or go on."""
 
     def __init__(self, gui: viser.GuiApi, send: Send, name: str) -> None:
         self._name = name
         self._words = gui.add_html("")
+        self._palm = _PalmField(gui, send) if name == "hand" else None
         self._begin = gui.add_button(course_name(name), icon=viser.Icon.PLAYER_PLAY, color=QUIET)
         self._anew = gui.add_button(_("Begin anew"), color=QUIET, visible=False)
         self._begin.on_click(self._beginning(send, anew=False))
         self._anew.on_click(self._beginning(send, anew=True))
 
-    def render(self, stand: Stand | None, *, ready: bool) -> None:
+    def render(self, stand: Stand | None, state: State) -> None:
         """Show where it stands; None: it is not to be begun now."""
+        ready = _ready(state)
+        if self._palm is not None:
+            self._palm.render(state, begins=stand is not None)
         for handle in (self._words, self._begin):
             put(handle, visible=stand is not None)
         left = stand is not None and stand.settled > 0

@@ -78,6 +78,11 @@ class LibraryPanel:
         self._shelf.render(state)
         self._elsewhere.render(review)
 
+    @property
+    def sheet_is_open(self) -> bool:
+        """Whether all measures are read now."""
+        return self._measures.sheet_is_open
+
     def export(self, event: Any) -> None:
         """Send the open take's file to the page that asked."""
         self._export.export(event)

@@ -38,6 +38,11 @@ class LooksPanel:
                     ("sensors", _("Sensors"), _("Key: S; shake one and it lights up")),
                     ("axes", _("Sensor axes"), _("Key: X; red x, green y, blue z")),
                     ("labels", _("Sensor names"), _("Key: N")),
+                    (
+                        "room",
+                        _("In the room"),
+                        _("Where a tracker saw it; else at its elbow"),
+                    ),
                 )
             }
         with self._panel.add_tab(_("Settings"), viser.Icon.SETTINGS):
@@ -50,7 +55,7 @@ class LooksPanel:
                 color=QUIET,
                 hint=_("A file for whoever helps; nothing of the people recorded is in it"),
             )
-        self._panel.float(x=-16.0, y=16.0, width=236.0, height=282.0)
+        self._panel.float(x=-16.0, y=16.0, width=236.0, height=312.0)
         self._panel.minimize()
         self._words = {view: label for label, view in words.items()}
         self._views.on_update(typed(lambda label: send(intents.SetView(words[label]))))
@@ -67,6 +72,8 @@ class LooksPanel:
         put(self._views, value=self._words[state.view])
         for part, box in self._shown.items():
             put(box, value=getattr(state.settings.shown, part))
+        room = state.review is not None and state.review.way is not None
+        put(self._shown["room"], visible=room)
         put(self._light, value=state.settings.theme == "light")
         by_tag = {tag: label for label, tag in self._languages.items()}
         put(self._language, value=by_tag.get(state.settings.language, by_tag[""]))

@@ -78,7 +78,7 @@ class Page:
             self._theme = state.settings.theme
             _set_theme(self._server.gui, self._theme)
         if self._tick % PLOTS_EVERY == 0:
-            self._transport.render(state)
+            self._transport.render(state, reading=self._library.sheet_is_open)
             self._recording.render(state)
             self._course.render(state)
             self._joint.render(state)

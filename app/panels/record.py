@@ -146,7 +146,7 @@ def ask_subject(
         code.disabled = subject is not None
         sides = {"right": _("right hand"), "left": _("left hand")}
         known = (subject.side if subject else "") or _side_of_device(state)
-        side = gui.add_dropdown(_("Hand"), tuple(sides.values()), initial_value=sides[known])
+        side = gui.add_dropdown(_("Which hand"), tuple(sides.values()), initial_value=sides[known])
         shortest, longest = HAND_LENGTH_MM
         measured = subject.hand_length_mm if subject is not None else None
         length = gui.add_number(

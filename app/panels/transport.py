@@ -11,6 +11,8 @@ from app.panels.base import QUIET, Send, put, typed
 from app.review import SPEEDS, Review
 from app.state import State
 from app.views import timeline
+from app.views.course import sheet_of
+from app.views.joint import sheet_is_open
 from app.views.recording import clock_of
 from app.views.written import grasp_words, trace_picture
 from app.words import _
@@ -22,7 +24,7 @@ _STEP_S = 0.01
 
 
 class TransportPanel:
-    """Moves through an opened take; there only while one is open."""
+    """Moves through an opened take; there while one is open and no sheet is in its place."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = gui.add_panel(visible=False)
@@ -88,10 +90,11 @@ class TransportPanel:
             ),
         )
 
-    def render(self, state: State) -> None:
-        """Show where in the take we are."""
+    def render(self, state: State, *, reading: bool) -> None:
+        """Show where in the take we are; ``reading``: a sheet of the page's own is in its place."""
         review = state.review
-        put(self._panel, visible=review is not None)
+        covered = reading or sheet_is_open(state) or sheet_of(state) is not None
+        put(self._panel, visible=review is not None and not covered)
         if review is None:
             return
         self._render_time(review)

@@ -128,7 +128,8 @@ def spectra_chart(spectra: dict[str, Spectrum]) -> str:
         return np.asarray(left + (np.asarray(hertz) - 1.0) / 14.0 * (right - left))
 
     def y(root: Array) -> Array:
-        return np.asarray(bottom - (np.log10(root) - low) / (high - low) * (bottom - top))
+        seen = np.maximum(root, 10.0**low)  # what is less lies on the lower edge
+        return np.asarray(bottom - (np.log10(seen) - low) / (high - low) * (bottom - top))
 
     a, b = (float(x(edge)) for edge in BAND_HZ)
     parts = [

@@ -20,6 +20,7 @@ from app.report.method import method_of, sources
 from app.report.replay import is_cut, replay_of
 from app.report.tables import tables_of
 from app.words import _
+from handstudio.analysis.posture_time import DEFAULT_BANDS, Band
 from handstudio.analysis.series import AngleSeries, series_of
 from handstudio.analysis.tremor import spectrum_of
 from handstudio.analysis.whole import tremor_angles
@@ -59,6 +60,7 @@ def report_of(
     *,
     earlier: Take | None = None,
     other_side: Take | None = None,
+    bands: Sequence[Band] = DEFAULT_BANDS,
     language: str = "en",
     progress: Progress = lambda _share: None,
 ) -> Report:
@@ -77,6 +79,7 @@ def report_of(
         window,
         earlier=earlier,
         other_side=other_side,
+        bands=bands,
         progress=lambda done: progress(0.8 * done),
     )
     chosen = setup or take.header.setup
@@ -177,7 +180,7 @@ def _facts(take: Take, setup: Setup, visit: Visit, recorded: datetime) -> list[t
     length = 1e3 * (setup.subject or setup.hand).hand_length_m
     return [
         (_("Subject"), visit.subject),
-        (_("Hand"), sides[visit.side]),
+        (_("Which hand"), sides[visit.side]),
         (_("Hand length"), f"{length:.0f} mm"),
         (_("Visit"), visit.visit),
         (_("Take"), take.path.stem),

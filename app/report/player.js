@@ -21,7 +21,7 @@
     const a = Math.cos(turn) * x - Math.sin(turn) * y, b = Math.sin(turn) * x + Math.cos(turn) * y;
     const up = Math.sin(tilt) * b + Math.cos(tilt) * z, deep = Math.cos(tilt) * b - Math.sin(tilt) * z;
     const scale = zoom * size.unit / (1 + 0.9 * deep);
-    return { x: size.w / 2 + scale * a, y: size.h * 0.7 - scale * up, deep: deep, scale: scale };
+    return { x: size.w / 2 + scale * a, y: size.h * 0.55 - scale * up, deep: deep, scale: scale };
   }
   function shaded(colour, deep) {
     const fade = Math.min(0.45, Math.max(0, 0.15 + 1.6 * deep));

@@ -8,11 +8,11 @@ from app.comparison import SMOOTHED, Comparison
 from app.state import State
 from app.views.course import GhostView
 from app.views.filters import filter_words
+from app.views.room import stand_of, standing
 from app.words import _
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import SEGMENTS
 from handstudio.kinematics import pose_of
-from handstudio.maths import so3
 
 _NONE = np.zeros(len(SEGMENTS), dtype=bool)
 
@@ -29,20 +29,12 @@ def compared_ghost(state: State) -> GhostView | None:
         return None
     second, fit = review.comparison, review.comparison.fit
     pose = pose_of(second.setup, second.at(float(review.time_s[review.index])).q_world_sensor, fit)
+    single = Pose(pose.q_world_segment[0], pose.t_world_joint[0], pose.t_world_tip[0])
     words = _("pale: {name}").format(name=choices()[second.name])
-    return GhostView(fit.skeleton, _turned(pose, state.yaw or 0.0), _NONE, words, beside=False)
+    return GhostView(fit.skeleton, standing(single, stand_of(state)), _NONE, words, beside=False)
 
 
 def comparison_words(comparison: Comparison) -> str:
     """What is pale in the picture and dashed in the plots."""
     name = comparison.take or choices()[comparison.name]
     return _("pale and dashed: {name}").format(name=name)
-
-
-def _turned(pose: Pose, yaw: float) -> Pose:
-    turn = so3.about_z(yaw)
-    return Pose(
-        so3.multiply(turn, pose.q_world_segment[0]),
-        so3.rotate(turn, pose.t_world_joint[0]),
-        so3.rotate(turn, pose.t_world_tip[0]),
-    )

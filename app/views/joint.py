@@ -120,6 +120,15 @@ def sheet_html(state: State) -> str:
     return ""
 
 
+def sheet_is_open(state: State) -> bool:
+    """Whether `sheet_html` says anything."""
+    finding = state.joint
+    if state.guided is not None or state.result is not None:
+        return False
+    begun = finding.course is not None and finding.course.phase is not JointPhase.INTRO
+    return finding.answer is not None or begun or finding.working
+
+
 def halo_of(state: State, view: HandView | SensorsView | None) -> HaloView | None:
     """Where the joint is on the hand that is shown; None: no such joint, or none was found."""
     answer = state.joint.answer

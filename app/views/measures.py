@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.report.names import about_name, grade_word, why_words
@@ -14,8 +14,11 @@ from app.views.pieces import AMBER, GREEN
 from app.words import _
 from handstudio.analysis.change import Change
 from handstudio.analysis.measure import Kind, Measure
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.sides import SideRatio
 from handstudio.analysis.tables import Row, grouped, judged
+from handstudio.kinematics import measured_angles
+from handstudio.layout import Layout
 from handstudio.measure import Measured
 from handstudio.recording.header import Header
 
@@ -55,6 +58,32 @@ def _takes(state: State, wanted: Callable[[Header, Header], bool]) -> dict[str, 
         and wanted(this, entry.take.header)
     ]
     return {words: path for _at, words, path in sorted(found, reverse=True)}
+
+
+def angle_choices(layout: Layout) -> dict[str, str]:
+    """Measured angles by what people call them."""
+    return {about_name(angle.name): angle.name for angle in measured_angles(layout)}
+
+
+def own_postures(bands: Sequence[Band]) -> dict[str, str]:
+    """Names of postures of one's own by words that tell all of each."""
+    words: dict[str, str] = {}
+    for band in bands:
+        ends = "" if band.above_deg is None else f"{band.above_deg:g}"
+        others = "" if band.below_deg is None else f"{band.below_deg:g}"
+        told = named_by_ends(about_name(band.angle), ends, others)
+        words[told if band.name == told else f"{band.name}: {told}"] = band.name
+    return words
+
+
+def named_by_ends(angle: str, above: str, below: str) -> str:
+    """What a posture is called that nobody gave a name."""
+    above, below = above.strip(), below.strip()
+    if not below:
+        return _("{angle} above {degrees}°").format(angle=angle, degrees=above)
+    if not above:
+        return _("{angle} below {degrees}°").format(angle=angle, degrees=below)
+    return _("{angle} {above} to {below}°").format(angle=angle, above=above, below=below)
 
 
 def short_html(review: Review) -> str:
@@ -135,7 +164,7 @@ def _brief(row: Row) -> str:
             out.append(" ".join(filter(None, [f"{name}{_figure(measure)}{unit}"])))
             if kind == "tam":
                 out[-1] += f" {grade_word(measure.grade)}"
-    return ", ".join(out)
+    return ", ".join(dict.fromkeys(out))  # one reason for all is said once
 
 
 def _figure(measure: Measure) -> str:

@@ -14,6 +14,7 @@ from app.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lower
 from app.state import State
 from app.views.comparison import comparison_words
 from app.views.health import worst_of
+from app.views.room import overlooking, room_words, stand_of, standing
 from app.views.timeline import rest_words
 from app.words import _, in_words
 from handstudio.arrays import Array
@@ -180,9 +181,11 @@ def camera_of(state: State, view: HandView | SensorsView | None) -> Camera:
     if state.guided is not None and state.view is View.DESK:
         return course_camera(state.guided.course.layout.side, near=looks_near(state))
     if isinstance(view, HandView):
-        camera = camera_for(state.view, view.skeleton, view.pose, state.yaw or 0.0)
+        camera = camera_for(state.view, view.skeleton, standing(view.pose, stand_of(state)))
     else:
-        camera = camera_for(state.view, None, None, 0.0)
+        camera = camera_for(state.view, None, None)
+    if state.view is View.DESK:
+        camera = overlooking(camera, state)
     above = state.review is not None or state.joint.answer is not None
     return lowered(camera, ABOVE_SHEET) if above else camera
 
@@ -228,7 +231,17 @@ def caption_of(state: State) -> str:
         smooth = _("smoothed") if review.setup.smooth else ""
         second = comparison_words(review.comparison) if review.comparison is not None else ""
         return " · ".join(
-            filter(None, [what, rest_words(review), smooth, second, _missing(review.setup)])
+            filter(
+                None,
+                [
+                    what,
+                    rest_words(review),
+                    room_words(state),
+                    smooth,
+                    second,
+                    _missing(review.setup),
+                ],
+            )
         )
     newest = state.newest
     if newest.setup is None or newest.motion is None:

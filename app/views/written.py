@@ -9,10 +9,12 @@ from jaxtyping import Float
 
 from app.review import Review
 from app.state import State
+from app.views.room import stand_of_writing
 from app.words import _
 from handstudio.analysis.take_grasps import TakenGrasp
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
+from handstudio.way import Stand
 
 _MARGIN_M, _DESK_M = 0.008, 0.12
 _HEIGHT_PX = 90
@@ -29,6 +31,7 @@ class TraceView:
         page: Corners of the page.
         lines: What is written by now, piece by piece.
         count: How many pieces that is: tells whether anything is new.
+        stand: Where the elbow rested.
     """
 
     writing: Writing
@@ -36,6 +39,7 @@ class TraceView:
     page: Float[Array, "4 3"]
     lines: Float[Array, "l 2 3"]
     count: int
+    stand: Stand
 
 
 def trace_view(state: State) -> TraceView | None:
@@ -48,7 +52,8 @@ def trace_view(state: State) -> TraceView | None:
     points = writing.on_plane
     lines = np.stack([points[:-1][both], points[1:][both]], axis=1)
     desk, page = (_corners(writing, margin_m) for margin_m in (_DESK_M, _MARGIN_M))
-    return TraceView(writing, desk, page, lines, len(lines))
+    stand = stand_of_writing(state, writing)
+    return TraceView(writing, desk, page, lines, len(lines), stand)
 
 
 def trace_picture(review: Review) -> str:

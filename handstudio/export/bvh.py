@@ -2,7 +2,8 @@
 
 At zero the hand lies flat, palm down, and points along -z. The channels X, Y, Z of a finger's joint
 are then its turns in the order of ours: minus flexion, deviation, rotation about the axis -z (for
-the thumb they are about the hand's axes). The format knows no gaps: the pose before is held.
+the thumb they are about the hand's axes). The format knows no gaps: the pose before is held, and
+the place before where a room is known but not the place.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from handstudio.arrays import Array
 from handstudio.export.bones import CHILDREN, in_parents, rest_in_forearm, tips
 from handstudio.export.frames import Frames, blocks, frames_of
 from handstudio.export.part import Part
+from handstudio.export.room import Placer
 from handstudio.export.y_up import turned_points
 from handstudio.hand.angles import decompose
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton
 from handstudio.hand_fit import fit_of
-from handstudio.kinematics import segment_attitudes
 from handstudio.maths import so3
 
 _CM = 100.0
@@ -33,14 +34,16 @@ def write(part: Part, file: BinaryIO) -> None:
     order = list(_depth_first(0))
     file.write(_hierarchy(fit.skeleton).encode())
     file.write(_motion_head(frames).encode())
-    place = _CM * turned_points(fit.skeleton.t_parent_joint[0])
-    held = np.zeros((1, len(SEGMENTS), 3))
+    placer = Placer(part, fit)
+    held = np.zeros((1, 3 + 3 * len(SEGMENTS)))
     for _first, count, motion, rows in blocks(part, frames):
-        turns = _turns(fit.skeleton, segment_attitudes(part.setup, motion.q_world_sensor, fit))
+        hand = placer.at(motion)
+        turns = _turns(fit.skeleton, hand.q_frame_segment)[:, order].reshape(len(motion), -1)
+        places = _CM * turned_points(hand.t_frame_root)
         newest = np.searchsorted(rows, np.arange(count), side="right")  # 0: of the block before
-        values = np.concatenate([held, turns[:, order]])[newest]
+        values = np.concatenate([held, np.hstack([places, turns])])[newest]
         held = values[-1:]
-        lines = (" ".join(f"{v:.5f}" for v in (*place, *turn.flat)) for turn in values)
+        lines = (" ".join(f"{v:.5f}" for v in row) for row in values)
         file.write(("\n".join(lines) + "\n").encode())
 
 

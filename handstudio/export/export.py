@@ -10,7 +10,7 @@ import msgspec
 
 from handstudio.export import metadata
 from handstudio.export.formats import Format
-from handstudio.export.part import Content, Part, Processed, Window, cut
+from handstudio.export.part import PLACED, Content, Part, Processed, Window, cut
 from handstudio.export.whole import written_whole
 
 
@@ -43,11 +43,11 @@ def export(
     kind = chosen.content(content, setup.layout)
     motion = cut(source.motion, window or Window())
     start_utc_ns = source.take.header.start_utc_ns
-    root = source.root if kind == "positions" else None
+    root = source.root if kind in PLACED else None
     part = Part(setup, motion, start_us, start_utc_ns, kind, {}, angles, progress, root)
     about = source.about | metadata.of_part(setup, motion, start_us, kind) | chosen.facts(part)
     if root is not None:
-        about |= metadata.of_root(root, source.take, motion)
+        about |= metadata.of_root(root, motion)
     part = replace(part, about=about)
     sidecar = msgspec.json.format(msgspec.json.encode(about))
     with written_whole(target, sidecar) as file:

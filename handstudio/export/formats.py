@@ -75,11 +75,13 @@ class Format:
         """What the file tells of how the format holds the motion."""
         told: dict[str, Any] = {"format": self.name}
         if self.axes:
-            told["axes"] = self.axes
+            told["axes"] = self.axes if part.root is None else _in_a_room(self.axes)
         if self.even:
             told |= frames_of(part).facts()
         if self.fills_gaps:
             told["in_gaps"] = "the pose before is held: the format knows no gaps"
+            if part.root is not None:
+                told["without_a_place"] = "the place before is held, at first the first one"
         return told | self.more(part)
 
     def _first(self, layout: Layout) -> Content:
@@ -91,6 +93,13 @@ _WITHOUT_A_HAND: tuple[Content, ...] = ("orientations", "motion")
 _TABLES: tuple[Content, ...] = ("angles", "orientations", "segments", "positions")
 _OURS = "z up, x to magnetic north, y to the west"
 _Y_UP = "y up, x to magnetic north, z to the east"
+
+
+def _in_a_room(axes: str) -> str:
+    """What is told of axes that are a tracker's."""
+    turned = "the tracker's room turned: its (x, y, z) is written as (x, z, -y)"
+    return axes.replace(_OURS, "the tracker's room").replace(_Y_UP, turned)
+
 
 FORMATS: dict[str, Format] = {
     each.name: each

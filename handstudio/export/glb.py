@@ -1,7 +1,8 @@
 """Animated GLB: a node a segment that turns in its parent, y up, metres, quaternions x, y, z, w.
 
 Time begins at the window's first instant. The pose is held over gaps, where a viewer would else
-glide. Either every node has a bone to see, or one more node has the skin (`glb_skin`).
+glide, and the place before where a room is known but not the place. Either every node has a bone
+to see, or one more node has the skin (`glb_skin`).
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from handstudio.export import glb_skin
 from handstudio.export.bones import CHILDREN, ends, in_parents
 from handstudio.export.gltf import Document
 from handstudio.export.part import BLOCK, Part, seconds
+from handstudio.export.room import Placer
 from handstudio.export.y_up import turned_points, turned_rotations
 from handstudio.hand.skeleton import SEGMENTS, Skeleton
 from handstudio.hand_fit import fit_of
-from handstudio.kinematics import segment_attitudes
 
 NODES = range(len(SEGMENTS))
 """The nodes of the segments."""
@@ -54,15 +55,21 @@ def write(part: Part, file: BinaryIO, *, skin: bool = False) -> None:
     else:
         _draw(document, fit.skeleton)
     which, time_s = _keys(part)
-    outputs = _animate(document, time_s)
+    placer = Placer(part, fit)
+    outputs, places = _animate(document, time_s, moves=placer.moves)
     first = document.begin(file)
     before = np.zeros((1, len(SEGMENTS), 4))
     for at in range(0, len(which), BLOCK):
         some = which[at : at + BLOCK]
         motion = part.motion[some[0] : some[-1] + 1]
-        local = in_parents(segment_attitudes(part.setup, motion.q_world_sensor, fit))
-        values = _smooth_signs(turned_rotations(local[some - some[0]]), before)
+        hand = placer.at(motion)
+        local = in_parents(hand.q_frame_segment)[some - some[0]]
+        values = _smooth_signs(turned_rotations(local), before)
         before = values[-1:]
+        if places is not None:
+            file.seek(first + document.place_of(places) + at * 12)
+            shown = turned_points(hand.t_frame_root)[some - some[0]]
+            file.write(shown.astype("<f4").tobytes())
         for node, output in zip(NODES, outputs, strict=True):
             file.seek(first + document.place_of(output) + at * 16)
             file.write(_xyzw(values[:, node]).astype("<f4").tobytes())
@@ -144,14 +151,23 @@ def _keys(part: Part) -> tuple[Array, Array]:
     return which, seconds(shown_us)
 
 
-def _animate(document: Document, time_s: Array) -> list[int]:
-    """An animation that turns every node; returns where its quaternions belong."""
+def _animate(document: Document, time_s: Array, *, moves: bool) -> tuple[list[int], int | None]:
+    """An animation that turns every node, and moves the first one.
+
+    Returns where its quaternions belong, and the places of the first node, if it moves.
+    """
     times = document.add(time_s)
     outputs = [document.reserve(len(time_s), 4) for _ in NODES]
     samplers = [{"input": times, "output": output} for output in outputs]
-    channels = [{"sampler": node, "target": {"node": node, "path": "rotation"}} for node in NODES]
+    channels: list[dict[str, Any]] = [
+        {"sampler": node, "target": {"node": node, "path": "rotation"}} for node in NODES
+    ]
+    places = document.reserve(len(time_s), 3) if moves else None
+    if places is not None:
+        channels.append({"sampler": len(samplers), "target": {"node": 0, "path": "translation"}})
+        samplers.append({"input": times, "output": places})
     document.about["animations"] = [{"name": "motion", "samplers": samplers, "channels": channels}]
-    return outputs
+    return outputs, places
 
 
 def _smooth_signs(q: Array, before: Array) -> Array:

@@ -2,7 +2,8 @@
 
 Messages are protobuf, in foxglove's own schemas where there is one: ``foxglove.FrameTransforms`` on
 ``/tf`` and ``foxglove.SceneUpdate`` on ``/hand``; angles are on ``/angles``. Their time is UTC.
-Without a hand the frames are the sensors', side by side: where they are nobody knows.
+Without a hand the frames are the sensors', side by side: where they are nobody knows. Where a room
+is known but not the hand's place in it, the forearm's frame is left out: viewers keep the last one.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from handstudio.arrays import Array
 from handstudio.colours import of_part
 from handstudio.export.bones import CHILDREN, in_parents, tips
 from handstudio.export.part import Part
+from handstudio.export.room import Placer
 from handstudio.hand.skeleton import PARENTS, SEGMENTS, Skeleton
 from handstudio.hand_fit import fit_of
-from handstudio.kinematics import angles_of, segment_attitudes
+from handstudio.kinematics import angles_of
 from handstudio.pipeline import Motion
 
 PROFILE = "handstudio.export"
@@ -63,6 +65,7 @@ class _Recording:
 
         self._part, self._writer = part, writer
         self._fit = fit_of(part.setup) if part.setup.layout.is_hand else None
+        self._placer = Placer(part, self._fit) if self._fit else None
         self._frames, self._scene = FrameTransforms, SceneUpdate
         self._tf = self._channel("/tf", FrameTransforms)
         self._hand = self._channel("/hand", SceneUpdate) if self._fit else 0
@@ -75,27 +78,38 @@ class _Recording:
         first = True
         for block in self._part.blocks():
             at_ns = self._part.start_utc_ns + (block.time_us - self._part.start_us) * 1000
-            q, t, children, parents = self._placed(block)
+            q, t, known, children, parents = self._placed(block)
             degrees = self._degrees(block)
             for k, now in enumerate(at_ns.tolist()):
                 if first and self._fit is not None:
                     self._send(self._hand, now, self._drawn(self._fit.skeleton, now))
                 first = False
-                self._send(self._tf, now, self._transforms(now, q[k], t, children, parents))
+                told = range(0 if known[k] else 1, len(children))
+                frames = [(q[k][i], t[k][i], children[i], parents[i]) for i in told]
+                self._send(self._tf, now, self._transforms(now, frames))
                 if self._angles_message is not None:
                     values = dict(zip(self._names, degrees[k], strict=True))
                     self._send(self._angles, now, self._angles_message(**values))
 
-    def _placed(self, motion: Motion) -> tuple[list[Any], list[Any], list[str], list[str]]:
-        """Attitudes in the parents, places, names of frames and of their parents."""
-        if self._fit is None:
+    def _placed(
+        self, motion: Motion
+    ) -> tuple[list[Any], list[Any], list[bool], list[str], list[str]]:
+        """Attitudes in the parents, places, of the first whether it is known; names of frames.
+
+        And of their parents.
+        """
+        count = len(motion)
+        if self._fit is None or self._placer is None:
             names = list(self._part.setup.layout.names)
-            places = [[_ASIDE_M * k, 0.0, 0.0] for k in range(len(names))]
-            return motion.q_world_sensor.tolist(), places, names, [WORLD] * len(names)
-        attitudes = segment_attitudes(self._part.setup, motion.q_world_sensor, self._fit)
+            places = [[[_ASIDE_M * k, 0.0, 0.0] for k in range(len(names))]] * count
+            q = motion.q_world_sensor.tolist()
+            return q, places, [True] * count, names, [WORLD] * len(names)
+        hand = self._placer.at(motion)
         parents = [WORLD if parent < 0 else SEGMENTS[parent] for parent in PARENTS]
-        places = self._fit.skeleton.t_parent_joint.tolist()
-        return in_parents(attitudes).tolist(), places, list(SEGMENTS), parents
+        t = np.tile(self._fit.skeleton.t_parent_joint, (count, 1, 1))
+        t[:, 0] = hand.t_frame_root
+        q = in_parents(hand.q_frame_segment).tolist()
+        return q, t.tolist(), hand.known.tolist(), list(SEGMENTS), parents
 
     def _degrees(self, motion: Motion) -> Array:
         if not self._names:
@@ -103,12 +117,10 @@ class _Recording:
         degrees: Array = np.rad2deg(angles_of(self._part.setup, motion, self._part.angles))
         return degrees
 
-    def _transforms(
-        self, now: int, q: list[Any], t: list[Any], children: list[str], parents: list[str]
-    ) -> Any:
+    def _transforms(self, now: int, frames: list[tuple[Any, Any, str, str]]) -> Any:
         message = self._frames()
         stamp = _stamp(now)
-        for (w, x, y, z), (a, b, c), child, parent in zip(q, t, children, parents, strict=True):
+        for (w, x, y, z), (a, b, c), child, parent in frames:
             frame = message.transforms.add(parent_frame_id=parent, child_frame_id=child)
             frame.timestamp.CopyFrom(stamp)
             rotation, place = frame.rotation, frame.translation
@@ -122,6 +134,7 @@ class _Recording:
         for index, name in enumerate(SEGMENTS):
             entity = message.entities.add(frame_id=name, id=name, frame_locked=True)
             entity.timestamp.CopyFrom(_stamp(now))
+            entity.lifetime.SetInParent()  # zero: for ever; foxglove's schemas want it said
             red, green, blue = (channel / 255.0 for channel in of_part(name))
             tip = tips(skeleton).get(index)
             carried = [skeleton.t_parent_joint[child] for child in CHILDREN[index]]
@@ -131,6 +144,8 @@ class _Recording:
                 bones.points.add(x=end[0], y=end[1], z=end[2])
             ball = entity.spheres.add()
             ball.pose.orientation.w = bones.pose.orientation.w = 1.0
+            for pose in (ball.pose, bones.pose):
+                pose.position.SetInParent()
             ball.size.x = ball.size.y = ball.size.z = _BALL_M
             for colour in (bones.color, ball.color):
                 colour.r, colour.g, colour.b, colour.a = red, green, blue, 1.0

@@ -16,7 +16,6 @@ from handstudio.kinematics import has_start
 from handstudio.pipeline import Doubt, Motion
 from handstudio.recording.take import Take
 from handstudio.recording.take_health import health_of_take
-from handstudio.recording.take_track import load_track
 from handstudio.rooted import Root
 from handstudio.setup import Setup
 
@@ -90,15 +89,13 @@ def of_part(setup: Setup, motion: Motion, start_us: int, content: str) -> dict[s
     return fields
 
 
-def of_root(root: Root, take: Take, motion: Motion) -> dict[str, Any]:
+def of_root(root: Root, motion: Motion) -> dict[str, Any]:
     """What places in a tracker's room stand on; it takes the place of the elbow as origin."""
-    kept = load_track(take.path)
-    assert kept is not None  # or there would be no root
     inside = np.searchsorted(root.time_us, motion.time_us)
     unknown = ~np.isfinite(root.t_room_elbow[inside, 0])
     return {
         "origin": "the tracker's own, in its own frame: places are in its room",
-        "track": msgspec.to_builtins(kept.facts),
+        "track": msgspec.to_builtins(root.facts),
         "without_a_place_percent": round(100.0 * float(np.mean(unknown)), 2),
     }
 

@@ -27,6 +27,9 @@ Content: TypeAlias = Literal[
 """What of a motion a file holds; ``skeleton``: how segments turn on each other, ``motion``: that
 and angles, of sensors where there is no hand."""
 
+PLACED: tuple[Content, ...] = ("positions", "skeleton", "motion")
+"""Of these it matters where the hand was."""
+
 BLOCK = 8192
 """Instants that are written at a time: memory does not grow with the take."""
 
@@ -79,7 +82,7 @@ class Part:
         about: What the file tells of itself.
         only: Names of the angles that are wanted; empty: all there are.
         tell: Told the share that is written.
-        root: Where the hand was in a tracker's room, where positions are wanted and that is known.
+        root: Where the hand was in a tracker's room, where that matters and is known.
     """
 
     setup: Setup

@@ -109,7 +109,7 @@ def test_a_take_is_measured_and_reported_on_the_page(
     page.get_by_role("tab", name="Review").click()
     choose(page, "^one · ")
     button(page, "Measure this part").click()
-    expect(page.get_by_text("Index PIP flexion")).to_be_visible()
+    expect(page.get_by_role("cell", name="Index PIP flexion")).to_be_visible()
     button(page, "All measures").click()
     expect(page.get_by_text("Active range of motion")).to_be_visible()
     button(page, "Close").click()

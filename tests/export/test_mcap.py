@@ -86,6 +86,27 @@ def test_bones_hang_in_the_frames_and_reach_to_the_next(into, whole):
             ]
 
 
+def left_out(message: Any) -> set[str]:
+    """Parts that the schema of a message has and it lacks: foxglove's JSON schemas want all."""
+    gone = set()
+    for field in message.DESCRIPTOR.fields:
+        if field.message_type is None:
+            continue
+        if field.is_repeated:
+            gone |= {name for each in getattr(message, field.name) for name in left_out(each)}
+        elif message.HasField(field.name):
+            gone |= left_out(getattr(message, field.name))
+        else:
+            gone.add(field.full_name)
+    return gone
+
+
+def test_nothing_that_the_schemas_have_is_left_out(into, whole):
+    _, topics, _ = read(into("mcap", whole, end_s=0.1))
+    for topic in ("/tf", "/hand"):
+        assert set().union(*(left_out(message) for _, message in topics[topic])) == set()
+
+
 def test_angles_are_degrees_by_name(into, whole):
     _, topics, _ = read(into("mcap", whole))
     angles = exported_angles(whole.setup, whole.motion)

@@ -195,15 +195,17 @@ def glb_points(path: Path) -> tuple[pygltflib.GLTF2, np.ndarray, np.ndarray]:
     gltf = pygltflib.GLTF2().load(str(path))
     (animation,) = gltf.animations
     turns = {}
+    moves = {}
     for channel in animation.channels:
-        assert channel.target.path == "rotation"
-        turns[channel.target.node] = accessor(gltf, animation.samplers[channel.sampler].output)
+        into = {"rotation": turns, "translation": moves}[channel.target.path]
+        into[channel.target.node] = accessor(gltf, animation.samplers[channel.sampler].output)
+    assert set(moves) <= {gltf.scenes[gltf.scene].nodes[0]}
     time_s = accessor(gltf, animation.samplers[0].input)[:, 0]
     found = {}
 
     def walk(node: int, q: np.ndarray, place: np.ndarray) -> None:
         here = gltf.nodes[node]
-        place = place + turned(q, np.array(here.translation))
+        place = place + (moves[node] if node in moves else turned(q, np.array(here.translation)))
         found[here.name] = place
         if node in turns:
             q = joined(q, turns[node])

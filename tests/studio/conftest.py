@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,13 +12,13 @@ import pytest
 
 from app import intents
 from app import review as reviewing
-from app.found import Found, found_in
 from app.jobs import Beside, Jobs
 from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
 from app.review import Review
 from app.state import State
 from app.studio import Studio
+from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Order, Phase, Report
@@ -26,6 +26,7 @@ from handstudio.device.recorder import Recorder
 from handstudio.export.export import export
 from handstudio.export.formats import FORMATS
 from handstudio.export.part import Content, Processed, Window
+from handstudio.finds import Found, finds
 from handstudio.measure import Measured, measure
 from handstudio.pipeline import Motion
 from handstudio.process import process
@@ -39,6 +40,7 @@ from handstudio.setup import Setup
 from handstudio.signals import signals
 from handstudio.survey import survey
 from handstudio.trim import trim
+from handstudio.way import find_way
 from handstudio.wizards.joint_course import JointCourse, Poses
 
 TICK_S = 0.016
@@ -93,7 +95,10 @@ class PromptJobs:
         return done(lambda: survey(open_take(path), setup))
 
     def find(self, path: Path, setup: Setup) -> Future[Found]:
-        return done(lambda: found_in(setup, process(open_take(path), setup)))
+        return done(lambda: finds(open_take(path), setup))
+
+    def find_way(self, path: Path, setup: Setup | None = None) -> Future[None]:
+        return done(lambda: find_way(open_take(path), setup))
 
     def signals(self, path: Path) -> Future[None]:
         return done(lambda: signals(open_take(path)))
@@ -116,15 +121,29 @@ class PromptJobs:
         return done(lambda: export(source, target, chosen, content=content, window=window))
 
     def measure(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        bands: Sequence[Band],
     ) -> Future[Measured]:
-        return done(lambda: measure(open_take(path), setup, window, **_opened(beside)))
+        take, others = open_take(path), _opened(beside)
+        return done(lambda: measure(take, setup, window, bands=bands, **others))
 
     def report(
-        self, path: Path, window: Window, setup: Setup | None, beside: Beside, language: str
+        self,
+        path: Path,
+        window: Window,
+        setup: Setup | None,
+        beside: Beside,
+        *,
+        bands: Sequence[Band],
+        language: str,
     ) -> Future[Path]:
         def work() -> Path:
-            made = report_of(open_take(path), setup, window, language=language, **_opened(beside))
+            asked = {"bands": bands, "language": language, **_opened(beside)}
+            made = report_of(open_take(path), setup, window, **asked)
             return save_report(made.html, report_path(path, language))
 
         return done(work)

@@ -12,6 +12,7 @@ from app.views import measures as view
 from handstudio.measure import measure
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import Take
+from handstudio.settings import SettingsStore
 
 from .conftest import after
 
@@ -96,3 +97,35 @@ def test_rows_of_a_measured_take_are_told_with_their_reasons(take: Take, review:
     html = view.full_html(measure(take))
     assert "needs a calibration of the hand" in html
     assert view.short_html(review) == ""
+
+
+def test_postures_of_ones_own_are_counted_with_the_usual_ones_and_remembered(
+    opened: Studio,
+) -> None:
+    after(opened, intents.MeasureHand())
+    added = after(opened, intents.AddPosture("up", "wrist_flexion", "-5", ""))
+    assert reviewed(added).measured is None  # it was measured without
+    after(opened, intents.AddPosture("Index bent", "index_pip_flexion", "30", "90"))
+    after(opened, intents.MeasureHand())
+    review = reviewed(opened.tick(0.1))
+    assert review.measured is not None
+    counted = [one.about for one in review.measured.measures if one.kind == "time_in_posture"]
+    assert counted[-2:] == ["up", "Index bent"]
+    assert "wrist_flexed_15" in counted
+    assert "Index bent" in view.full_html(review.measured)
+    opened.store.flush()
+    kept = SettingsStore.opened(opened.store.path).settings.postures
+    assert [band.name for band in kept] == ["up", "Index bent"]
+    assert view.own_postures(kept) == {
+        "up: Wrist flexion above -5°": "up",
+        "Index bent: Index PIP flexion 30 to 90°": "Index bent",
+    }
+    after(opened, intents.RemovePosture("up"))
+    assert [band.name for band in opened.state.settings.postures] == ["Index bent"]
+
+
+@pytest.mark.parametrize("ends", [("", ""), ("30", "10"), ("ten", ""), ("5", "5"), ("nan", "")])
+def test_ends_that_are_none_are_refused_in_words(opened: Studio, ends: tuple[str, str]) -> None:
+    state = after(opened, intents.AddPosture("up", "wrist_flexion", *ends))
+    assert state.settings.postures == ()
+    assert "no range of degrees" in state.messages[0].text

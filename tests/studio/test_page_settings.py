@@ -18,6 +18,7 @@ from app.studio import Studio
 from app.views import calibration as calibration_view
 from app.views import health as health_view
 from app.views.page import HandView, camera_of, overlay_of, scene_of, status_of
+from app.views.room import stand_of, standing
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Phase
 from handstudio.health.findings import PER_SENSOR, Finding, Kind
@@ -93,7 +94,7 @@ def test_the_language_asked_for_at_the_start_holds_until_another_is_chosen(
 def test_every_view_sees_the_whole_hand(review: Review, view: View, studio: Studio) -> None:
     shown = scene_of(replace(studio.state, review=review))
     assert isinstance(shown, HandView)
-    camera = camera_for(view, shown.skeleton, shown.pose, 0.7)
+    camera = camera_for(view, shown.skeleton, shown.pose)
     distance = float(((camera.place - camera.target) ** 2).sum() ** 0.5)
     assert 0.25 < distance < 0.8
     assert abs(float((camera.up**2).sum()) - 1.0) < 1e-9
@@ -105,7 +106,7 @@ def test_an_open_takes_hand_stands_clear_of_the_sheet_below(review: Review, stud
     assert isinstance(shown, HandView)
     for view in View:
         camera = camera_of(replace(state, view=view), shown)
-        before = camera_for(view, shown.skeleton, shown.pose, state.yaw or 0.0)
+        before = camera_for(view, shown.skeleton, standing(shown.pose, stand_of(state)))
         ahead = (camera.target - camera.place) / np.linalg.norm(camera.target - camera.place)
         towards = before.target - camera.place
         up = float(towards @ camera.up) - float(towards @ ahead) * float(ahead @ camera.up)
@@ -120,8 +121,7 @@ def test_palm_and_back_are_opposite_and_the_thumb_is_at_the_side(
     shown = scene_of(replace(studio.state, review=review))
     assert isinstance(shown, HandView)
     palm, back, thumb = (
-        camera_for(view, shown.skeleton, shown.pose, 0.0)
-        for view in (View.PALM, View.BACK, View.THUMB)
+        camera_for(view, shown.skeleton, shown.pose) for view in (View.PALM, View.BACK, View.THUMB)
     )
     assert palm.place - palm.target == pytest.approx(-(back.place - back.target))
     assert (thumb.place - thumb.target) @ (back.place - back.target) == pytest.approx(0.0, abs=1e-9)

@@ -15,7 +15,6 @@ from app import intents
 from app import review as reviewing
 from app.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
 from app.comparison import OF_TAKE
-from app.found import Found
 from app.jobs import Stopped
 from app.review import Review
 from app.review import opened as opened_review
@@ -30,10 +29,12 @@ from handstudio.analysis.take_grasps import TakenGrasp
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
+from handstudio.finds import Found
 from handstudio.process import kept_motion, process, process_head
 from handstudio.recording.notes import with_mark
 from handstudio.recording.simulated import rehearse, simulate
 from handstudio.recording.take import open_take
+from handstudio.recording.take_track import track_path
 from handstudio.setup import Setup
 
 from .conftest import TICK_S, StillCapture, after
@@ -368,3 +369,27 @@ def until(studio: Studio, intent: intents.Intent, holds: Callable[[State], objec
         time.sleep(0.01)
         state = studio.tick(TICK_S)
     raise AssertionError("it did not happen")
+
+
+def test_grasps_and_writing_are_searched_for_at_the_first_opening_alone(
+    studio: Studio, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened(studio, path)
+    studio.tick(TICK_S)
+    monkeypatch.setattr(studio._workshop, "find", None)
+    after(studio, intents.ShowLive())
+    assert opened(studio, path).found is not None
+
+
+def test_a_track_that_cannot_be_read_is_told_once_and_the_hand_stays_at_its_elbow(
+    studio: Studio, path: Path
+) -> None:
+    track_path(path).write_bytes(b"no archive")
+    after(studio, intents.OpenTake(path))
+    told = [said.text for _ in range(4) for said in studio.tick(TICK_S).messages]
+    for name in ("index", "thumb"):
+        told += [said.text for said in after(studio, intents.ChooseCurves(name)).messages]
+        told += [said.text for said in studio.tick(TICK_S).messages]
+    assert len([text for text in told if "the track cannot be read" in text]) == 1
+    assert studio.state.review is not None
+    assert studio.state.review.way is None
