@@ -41,6 +41,20 @@ def joint_to(fp, fc, weight, p, c, info, pull, cross):
 
 @compiled
 @no_type_check
+def turn_to(axis, angle, weight, p, c, info, pull, cross):
+    """The child is to turn so far against its parent, about an axis of the world, weighed."""
+    for i in range(3):
+        pull[p, i] -= weight * axis[i] * angle
+        pull[c, i] += weight * axis[i] * angle
+        for j in range(3):
+            v = weight * axis[i] * axis[j]
+            info[p, i, j] += v
+            info[c, i, j] += v
+            cross[c, i, j] -= v
+
+
+@compiled
+@no_type_check
 def observe(beliefs, m, st, dt, gyr, flags, w):
     """Gather what the instant before tells: information, pull, and coupling along edges."""
     w.info[:], w.pull[:], w.cross[:] = 0.0, 0.0, 0.0
@@ -170,14 +184,7 @@ def _axes(beliefs, m, st, s, period, w):
     e = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     n0, n1, n2 = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     a[0], a[1], a[2] = n0, n1, n2
-    for i in range(3):
-        w.pull[p, i] -= weight * a[i] * e
-        w.pull[s, i] += weight * a[i] * e
-        for j in range(3):
-            v = weight * a[i] * a[j]
-            w.info[p, i, j] += v
-            w.info[s, i, j] += v
-            w.cross[s, i, j] -= v
+    turn_to(a, e, weight, p, s, w.info, w.pull, w.cross)
 
 
 @compiled
@@ -220,14 +227,7 @@ def _led_back(beliefs, st, p, s, turn, ends, axis, period, w):
     back = -beyond if off > 0.0 else beyond
     # ends have a margin for axes that are off for long: what is off does not count so long here
     weight = period / ((beliefs.axis_noise**2 + st.slow[s, 0]) * beliefs.axis_lasts_s)
-    for i in range(3):
-        w.pull[p, i] -= weight * axis[i] * back
-        w.pull[s, i] += weight * axis[i] * back
-        for j in range(3):
-            v = weight * axis[i] * axis[j]
-            w.info[p, i, j] += v
-            w.info[s, i, j] += v
-            w.cross[s, i, j] -= v
+    turn_to(axis, back, weight, p, s, w.info, w.pull, w.cross)
 
 
 @compiled
