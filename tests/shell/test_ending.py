@@ -88,10 +88,12 @@ def test_a_glove_that_goes_and_comes_back_is_told_of(begun, tmp_path):
         link.unlink()
     assert "is lost" in recorder.stderr.readline()
     with subprocess.Popen(command, stdout=subprocess.PIPE) as glove:
-        assert f"serial:{link} is back" in recorder.stderr.readline()
-        recorder.send_signal(signal.SIGINT)
-        out, _ = recorder.communicate(timeout=WITHIN_S)
-        glove.terminate()
+        try:
+            assert f"serial:{link} is back" in recorder.stderr.readline()
+            recorder.send_signal(signal.SIGINT)
+            out, _ = recorder.communicate(timeout=WITHIN_S)
+        finally:
+            glove.terminate()
     assert recorder.returncode == 0
     assert open_take(Path(msgspec.json.decode(out)["path"])).summary is not None
 
