@@ -75,7 +75,9 @@ def press(studio):
     while studio.capture.newest.phase is not Phase.STREAMING:
         time.sleep(0.01)
     studio.send(intents.SetCountdown(0))
-    studio.send(intents.SaveSubject("S01", "right", 187.0, then_record=True))
+    while studio.capture.newest.recorder is None:  # refused where a busy machine's glove was away
+        studio.send(intents.SaveSubject("S01", "right", 187.0, then_record=True))
+        time.sleep(5.0)
 
 product._begin = begun
 product.run(product.Options(Path(sys.argv[3]), sys.argv[2], port=9765, browser=False))
