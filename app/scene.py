@@ -18,8 +18,10 @@ from app.views.course import GhostView
 from app.views.held import HeldView
 from app.views.joint import HaloView
 from app.views.page import HandView, SensorsView
+from app.views.room import standing
 from app.views.written import TraceView
 from handstudio.arrays import Array
+from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import FINGERS, SEGMENTS, Skeleton
 from handstudio.layout import Layout
 from handstudio.maths import so3
@@ -47,7 +49,8 @@ class Scene:
         self._server = server
         self._root = server.scene.add_frame("/hand", show_axes=False)
         self._hand = _HandNodes(server)
-        self._skin = SkinNodes(server, "/hand/skin")
+        # not below the frame that moves: pages leave the bones of a skin where that first was
+        self._skin = SkinNodes(server, "/skin")
         self._ghost = _GhostNodes(server)
         self._ink = InkNodes(server)
         self._held = HeldNodes(server)
@@ -66,7 +69,7 @@ class Scene:
             case HandView():
                 self._clear_sensors()
                 self._hand.render(view, visible=shown.bones)
-                self._render_skin(view, shown)
+                self._render_skin(view, standing(view.pose, stand), shown)
                 self._boards.render(view, shown)
             case SensorsView():
                 self._clear_hand()
@@ -124,15 +127,15 @@ class Scene:
                 client.camera.position = camera.place
                 client.camera.look_at = camera.target
 
-    def _render_skin(self, view: HandView, shown: Shown) -> None:
+    def _render_skin(self, view: HandView, pose: Pose, shown: Shown) -> None:
         """Bones are seen through skin, and tell what is in doubt; alone it tells so itself."""
         if not shown.skin:
             self._skin.hide()
             return
         opacity = _SEE_THROUGH if shown.bones else None
-        self._skin.render(view.skeleton, view.pose, colours.SKIN, opacity)
+        self._skin.render(view.skeleton, pose, colours.SKIN, opacity)
         told = np.zeros_like(view.doubtful) if shown.bones else view.doubtful
-        self._skin.mark(view.pose, told, view.dead)
+        self._skin.mark(pose, told, view.dead)
 
     def _clear_hand(self) -> None:
         self._hand.clear()
