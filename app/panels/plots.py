@@ -16,8 +16,8 @@ from app.words import _
 from handstudio.arrays import Array
 
 _HEIGHT = 164
-_WIDE_PX, _NARROW_PX = 400.0, 300.0
-"""So wide; on a narrow page so that transport and way of working stand beside it."""
+_WIDE_PX = 400.0
+"""On narrow pages too: a panel of another width does not stay put away."""
 _VEIL = "38"  # how much of a band's colour is seen, as a page writes it
 _WIDEST = 30.0  # [deg]: a band is not to press the curves flat
 _AXIS = "#9aa0aa"
@@ -35,7 +35,7 @@ class PlotsPanel:
         with self._panel.add_tab(_("Health"), viser.Icon.HEARTBEAT):
             self._health = gui.add_html("")
         self._panel.dock_right()
-        self._panel.set_width(_NARROW_PX if narrow else _WIDE_PX)
+        self._panel.set_width(_WIDE_PX)
         if narrow:
             self._panel.minimize()
         with self._tab:
