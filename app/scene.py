@@ -75,10 +75,7 @@ class Scene:
                 self._clear_hand()
                 self._show_sensors(view)
             case None:
-                # pages fail where skin goes that they have only just begun to draw
-                self._hand.clear()
-                self._boards.clear()
-                self._skin.hide()
+                self._clear_hand()
                 self._clear_sensors()
 
     def render_ghost(self, view: GhostView | None, shown: Shown) -> None:
@@ -139,7 +136,7 @@ class Scene:
 
     def _clear_hand(self) -> None:
         self._hand.clear()
-        self._skin.clear()
+        self._skin.hide()  # kept: pages fail where skin goes that they have only just begun to draw
         self._boards.clear()
 
     def _show_sensors(self, view: SensorsView) -> None:

@@ -18,7 +18,7 @@ from handstudio.analysis.take_writing import can_tell_writing, writings_in
 from handstudio.analysis.writing import Writing
 from handstudio.arrays import Array
 from handstudio.pipeline import Motion
-from handstudio.process import Progress, motion_folder, process
+from handstudio.process import Progress, kept_folder, process
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
 
@@ -160,6 +160,4 @@ def _writing(told: _Written, number: int, file: dict[str, Array]) -> Writing:
 
 
 def _path(take: Take, setup: Setup | None) -> Path:
-    own = take.header.setup
-    chosen = setup or own
-    return motion_folder(take, chosen, from_start=chosen != own) / "finds.npz"
+    return kept_folder(take, setup) / "finds.npz"

@@ -110,11 +110,16 @@ def kept_motion(take: Take, setup: Setup | None = None) -> Motion | None:
 
     ``setup`` is another one than the take's own.
     """
-    own = take.header.setup
-    chosen = setup or own
     if not _home(take.path).exists():  # found without hashing a long take, which takes its time
         return None
-    return _opened(motion_folder(take, chosen, from_start=chosen != own))
+    return _opened(kept_folder(take, setup))
+
+
+def kept_folder(take: Take, setup: Setup | None = None) -> Path:
+    """Where the motion of a take is kept, by its own setup or another, and what was found in it."""
+    own = take.header.setup
+    chosen = setup or own
+    return motion_folder(take, chosen, from_start=chosen != own)
 
 
 def aligned_setup(take: Take, setup: Setup | None = None) -> tuple[Setup, HeadingAlignment]:

@@ -9,7 +9,7 @@ import msgspec
 
 from handstudio.analysis.stretches import Stretch, stretches_of
 from handstudio.errors import TakeError
-from handstudio.process import Progress, motion_folder, process
+from handstudio.process import Progress, kept_folder, process
 from handstudio.recording.atomic import write_json
 from handstudio.recording.take import Take
 from handstudio.setup import Setup
@@ -51,6 +51,4 @@ def kept_survey(take: Take, setup: Setup | None = None) -> tuple[Stretch, ...] |
 
 
 def _path(take: Take, setup: Setup | None) -> Path:
-    own = take.header.setup
-    chosen = setup or own
-    return motion_folder(take, chosen, from_start=chosen != own) / "stretches.json"
+    return kept_folder(take, setup) / "stretches.json"

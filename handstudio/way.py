@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int64
 
 from handstudio.arrays import Array
 from handstudio.maths import so3
-from handstudio.process import Progress, motion_folder, process
+from handstudio.process import Progress, kept_folder, process
 from handstudio.recording.take import Take
 from handstudio.rooted import Root, root_of, track_key
 from handstudio.setup import Setup
@@ -135,7 +135,5 @@ def _filled(root: Root) -> Float[Array, "n 8"]:
 
 
 def _path(take: Take, setup: Setup | None) -> Path:
-    own = take.header.setup
-    chosen = setup or own
-    folder, key = motion_folder(take, chosen, from_start=chosen != own), track_key(take, chosen)
-    return folder / f"way-{_VERSION}-{'none' if key is None else key[:16]}.npy"
+    key = track_key(take, setup or take.header.setup)
+    return kept_folder(take, setup) / f"way-{_VERSION}-{'none' if key is None else key[:16]}.npy"

@@ -47,8 +47,6 @@ class Chain:
         covariance: Of them.
         prior_sd: Standard deviations before.
         residual: RMS of what is left [m/s²], by joint.
-        soft: How boards tilt where they are accelerated [rad per m/s²]: those of the forearm, all
-            others; and how far they stay behind [m per m/s²].
     """
 
     index: dict[Key, int]
@@ -56,7 +54,6 @@ class Chain:
     covariance: Float[Array, "u u"]
     prior_sd: Float[Array, " u"]
     residual: dict[str, float]
-    soft: Float[Array, " 4"]
 
     def link(self, joint: str) -> tuple[Array, Array]:
         """From the centre before to this joint's, in the parent's sensor; and covariance."""
@@ -116,7 +113,7 @@ def solved(
     residual = _residuals(_all_blocks(tree, index), x, priors)
     x = _between_axes(tree, index, x)
     covariance = covariance + priors.model_m**2 * np.eye(len(x))
-    return Chain(index, x, covariance, sd, residual, soft)
+    return Chain(index, x, covariance, sd, residual)
 
 
 def _between_axes(tree: Tree, index: dict[Key, int], x: Array) -> Array:
@@ -166,7 +163,11 @@ def _all_blocks(tree: Tree, index: dict[Key, int]) -> list[Block]:
 
 
 def _settled(swings: Swings, by: Pushed, soft: Array) -> Swings:
-    """As if boards stayed on the bone, if they are so soft."""
+    """As if boards stayed on the bone.
+
+    ``soft``: how they tilt where they are accelerated [rad per m/s²], those of the forearm, all
+    others; and how far they stay behind [m per m/s²].
+    """
     forearm = np.array([place.segment == "forearm" for place in swings.layout.sensors])
     tilting, lagging = (np.where(forearm, there, else_) for there, else_ in soft.reshape(2, 2))
     return settled(swings, by, tilting, lagging)
