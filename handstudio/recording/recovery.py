@@ -86,6 +86,12 @@ def _beginning(records: Iterator[McapRecord | Told], path: Path) -> tuple[Header
             header = decode_header(about, str(path))
         if isinstance(record, Attachment) and record.name == STATE_ATTACHMENT and header:
             return header, sound_state(about, record.data)
+    if path.stat().st_size == 0:
+        raise TakeError(
+            "{path}: is empty, the recording was interrupted before anything was recorded.",
+            "Nothing is lost: delete it.",
+            path=path,
+        )
     raise TakeError(
         "{path}: holds nothing of a take that can be read.",
         "If it was recorded elsewhere, copy it again: the copy may be cut short.",

@@ -37,6 +37,8 @@ FLUSH_S = 0.25
 """How often a recording is handed to the operating system, by the clock and by the times of what is
 written: the most a crash can cost."""
 
+_BUFFER = 1 << 20  # [byte] more than a beginning is long, so that a file has all of it or nothing
+
 
 class TakeWriter:
     """Writes one take; not to be shared between threads.
@@ -143,7 +145,7 @@ class TakeWriter:
         with self._saying_what_to_do():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             try:
-                stream = self._unfinished.open("xb")
+                stream = self._unfinished.open("xb", buffering=_BUFFER)
             except FileExistsError as error:
                 raise TakeError(
                     "{path} is there already: an interrupted recording.",

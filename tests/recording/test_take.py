@@ -102,6 +102,22 @@ def test_what_is_older_than_the_flush_interval_is_handed_over(tmp_path, header, 
     writer.abandon()
 
 
+def test_a_file_has_its_beginning_whole_or_nothing(tmp_path, header, monkeypatch):
+    seen = []
+    beginning = TakeWriter.flush
+
+    def flush(self):
+        seen.append(file.stat().st_size)
+        beginning(self)
+        seen.append(file.stat().st_size)
+
+    monkeypatch.setattr(TakeWriter, "flush", flush)
+    file = unfinished(tmp_path / "squeeze.mcap")
+    TakeWriter(tmp_path / "squeeze.mcap", header, b"s" * 300_000).abandon()
+    assert seen[0] == 0
+    assert seen[1] > 300_000
+
+
 # --- never overwriting ------------------------------------------------------------------------
 
 
