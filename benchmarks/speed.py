@@ -10,6 +10,7 @@ proportion.
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
 import time
 from collections.abc import Callable
@@ -128,20 +129,28 @@ def _live_us(samples: ImuSamples, setup: Setup) -> float:
 
 def _offline() -> dict[str, float]:
     """A minute's take from its bytes to a CSV of angles, and smoothed, against real time."""
-    found = {}
     with tempfile.TemporaryDirectory() as folder:
         # with its health, as a recorded take has it: else an export works that out first
         path = simulate(Path(folder), seconds=60.0, health=True)
         take = open_take(path)
-        for name in ("tree", "vqf"):
-            setup = replace_filter(take.header.setup, name)
-            begin = time.perf_counter()
-            motion = process(take, setup)
-            export(Processed(take, setup, motion), path.with_suffix(f".{name}.csv"), FORMATS["csv"])
-            found[f"offline_x_realtime_{name}"] = 60.0 / (time.perf_counter() - begin)
-        begin = time.perf_counter()
-        process(take, smoothing(take.header.setup))
-        found["smooth_x_realtime"] = 60.0 / (time.perf_counter() - begin)
+
+        def times_realtime(setup: Setup, target: Path | None) -> float:
+            def work() -> None:
+                shutil.rmtree(path.with_suffix(".motion"), ignore_errors=True)
+                motion = process(take, setup)
+                if target is not None:
+                    export(Processed(take, setup, motion), target, FORMATS["csv"])
+
+            return 60.0e6 / _quickest(work, 1)
+
+        own = take.header.setup
+        found = {
+            f"offline_x_realtime_{name}": times_realtime(
+                replace_filter(own, name), path.with_suffix(".csv")
+            )
+            for name in ("tree", "vqf")
+        }
+        found["smooth_x_realtime"] = times_realtime(smoothing(own), None)
     return found | {"offline_x_realtime": found["offline_x_realtime_tree"]}
 
 
