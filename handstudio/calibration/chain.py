@@ -22,7 +22,7 @@ from jaxtyping import Float
 
 from handstudio.arrays import Array
 from handstudio.calibration.axes import JointAxis
-from handstudio.calibration.chain_rows import Block, blocks_of
+from handstudio.calibration.chain_rows import Block, blocks_of, instants
 from handstudio.calibration.chain_tree import (
     USUAL,
     Key,
@@ -92,26 +92,23 @@ def solved(
         skeleton: Mean proportions of this hand's length.
         priors: How well everything is known before.
     """
-    index = index_of(Tree(swings, axes))
-    mean, precision = prior_of(Tree(swings, axes), index, skeleton, priors)
+    tree = Tree(swings, axes)
+    index = index_of(tree)
+    mean, precision = prior_of(tree, index, skeleton, priors)
     sd = 1.0 / np.sqrt(np.diag(precision))
     by, soft, x, weights = pushed(swings), np.zeros(len(_STEPS)), mean, list[Array]()
     for count in range(_ROUNDS):
-        blocks = _all_blocks(Tree(_settled(swings, by, soft), axes), index)
+        blocks = _all_blocks(tree, index, by, soft)
         weights = [
             block.weights(x, priors) if count else np.ones(len(block.y) // 3) for block in blocks
         ]
-        more = [
-            _all_blocks(Tree(_settled(swings, by, soft + step), axes), index)
-            for step in np.diag(_STEPS)
-        ]
+        more = [_all_blocks(tree, index, by, soft + step) for step in np.diag(_STEPS)]
         x, change, covariance = _stepped(
             blocks, more, x, weights, before=(mean, precision, soft), priors=priors
         )
         soft = soft + change
-    tree = Tree(_settled(swings, by, soft), axes)
-    residual = _residuals(_all_blocks(tree, index), x, priors)
-    x = _between_axes(tree, index, x)
+    residual = _residuals(_all_blocks(tree, index, by, soft), x, priors)
+    x = _between_axes(Tree(_settled(swings, by, soft), axes), index, x)
     covariance = covariance + priors.model_m**2 * np.eye(len(x))
     return Chain(index, x, covariance, sd, residual)
 
@@ -158,8 +155,13 @@ def _add(x: Array, index: dict[Key, int], key: Key, what: Array) -> None:
         x[index[key] : index[key] + 3] += what
 
 
-def _all_blocks(tree: Tree, index: dict[Key, int]) -> list[Block]:
-    return [block for swing in tree.swings.swings for block in blocks_of(tree, swing, index)]
+def _all_blocks(tree: Tree, index: dict[Key, int], by: Pushed, soft: Array) -> list[Block]:
+    blocks = list[Block]()
+    for swing in tree.swings.swings:
+        part = instants(swing, tree.swings.rate_hz)
+        felt = _settled(tree.swings.at(part), by.at(part), soft)
+        blocks += blocks_of(tree, swing, index, part, felt)
+    return blocks
 
 
 def _settled(swings: Swings, by: Pushed, soft: Array) -> Swings:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from handstudio.arrays import Array
 from handstudio.calibration.chain_tree import Key, Priors, Tree
 from handstudio.calibration.rigid_rotation import skew
-from handstudio.calibration.swings import Swing
+from handstudio.calibration.swings import Swing, Swings
 from handstudio.maths import so3
 from handstudio.samples import STANDARD_GRAVITY
 
@@ -57,12 +57,25 @@ class Block:
         return weight
 
 
-def blocks_of(tree: Tree, swing: Swing, index: dict[Key, int]) -> list[Block]:
-    """Equations of one swing, one block a sensor that it moves."""
-    step = max(1, round(_EVERY_S * tree.swings.rate_hz))
-    part = slice(swing.window.start, swing.window.stop, step)
-    felt = {s: _Felt(tree, s, part) for s in tree.segment}
-    ramp = np.linspace(-1.0, 1.0, len(range(*part.indices(len(tree.swings.gyr)))))
+def instants(swing: Swing, rate_hz: float) -> slice:
+    """Those of a course that stand in the equations of a swing."""
+    return slice(swing.window.start, swing.window.stop, max(1, round(_EVERY_S * rate_hz)))
+
+
+def blocks_of(
+    tree: Tree, swing: Swing, index: dict[Key, int], part: slice, told: Swings
+) -> list[Block]:
+    """Equations of one swing, one block a sensor that it moves.
+
+    Args:
+        tree: Who hangs on whom.
+        swing: Whose.
+        index: Where each unknown vector begins.
+        part: Its instants, of the whole course.
+        told: What sensors told then, as if their boards stayed on the bone.
+    """
+    felt = _felt(told)
+    ramp = np.linspace(-1.0, 1.0, len(told.gyr))
     tilt = np.concatenate(
         [np.broadcast_to(_TILTED, (len(ramp), 3, 2)), _TILTED * ramp[:, None, None]], axis=2
     ).reshape(-1, 4)
@@ -95,19 +108,26 @@ def blocks_of(tree: Tree, swing: Swing, index: dict[Key, int]) -> list[Block]:
     return out
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Felt:
     """Matrices of one sensor in one swing."""
 
-    def __init__(self, tree: Tree, sensor: int, part: slice) -> None:
-        swings = tree.swings
-        self.turn = so3.to_matrix(swings.q_world_sensor[part, sensor])
-        self.acc, self.gyr = swings.acc[part, sensor], swings.gyr[part, sensor]
-        self.spin = skew(self.gyr)
-        self.gamma = skew(swings.dgyr[part, sensor]) + self.spin @ self.spin
-        self.of_point = self.turn @ self.gamma
+    acc: Float[Array, "n 3"]
+    turn: Float[Array, "n 3 3"]
+    spin: Float[Array, "n 3 3"]
+    gamma: Float[Array, "n 3 3"]
+    of_point: Float[Array, "n 3 3"]
 
     def of_wander(self, turned: tuple[Array, Array, Array], part: slice) -> Array:
         """Acceleration by a place that goes with a joint's angle, per m/rad."""
         angle, rate, more = (x[part, None, None] for x in turned)
         inside = self.gamma * angle + 2.0 * self.spin * rate + np.eye(3) * more
         return np.asarray(self.turn @ inside)
+
+
+def _felt(told: Swings) -> list[_Felt]:
+    """Of every sensor."""
+    turn, spin = so3.to_matrix(told.q_world_sensor), skew(told.gyr)
+    gamma = skew(told.dgyr) + spin @ spin
+    every = (told.acc, turn, spin, gamma, turn @ gamma)
+    return [_Felt(*(x[:, s] for x in every)) for s in range(told.gyr.shape[1])]

@@ -80,6 +80,11 @@ class Swings:
             first[ULNAR] = first["hand"]
         return first
 
+    def at(self, part: slice) -> Swings:
+        """Its signals at some instants; windows and flat hand still count in the whole."""
+        signals = ("q_world_sensor", "gyr", "dgyr", "acc")
+        return replace(self, **{name: getattr(self, name)[part] for name in signals})
+
     def q_flat(self, sensor: int) -> Float[Array, " 4"]:
         """Attitude of a sensor in the middle of the flat hand."""
         middle = (self.flat.start + self.flat.stop) // 2
@@ -191,6 +196,12 @@ class Pushed:
     tilt_rate: Float[Array, "n s 3"]
     tilt_acc: Float[Array, "n s 3"]
     further: Float[Array, "n s 3"]
+
+    def at(self, part: slice) -> Pushed:
+        """At some instants."""
+        return Pushed(
+            self.tilt[part], self.tilt_rate[part], self.tilt_acc[part], self.further[part]
+        )
 
 
 def pushed(swings: Swings) -> Pushed:

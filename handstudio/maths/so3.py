@@ -92,8 +92,13 @@ def angle_between(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[A
 
 def to_matrix(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3 3"]:
     """Rotation matrices: columns are the axes of b written in a."""
-    eye = np.eye(3)
-    return np.stack([rotate(q, eye[i]) for i in range(3)], axis=-1)
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    rows = [
+        *(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        *(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        *(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    ]
+    return np.stack(rows, axis=-1).reshape(*q.shape[:-1], 3, 3)
 
 
 def from_matrix(m: Float[Array, "*b 3 3"]) -> Float[Array, "*b 4"]:

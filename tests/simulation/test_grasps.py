@@ -144,7 +144,7 @@ def test_distances_are_negative_inside_and_as_far_as_the_nearest_point_outside()
 @pytest.mark.long
 def test_everybody_finds_a_hold_and_most_are_clean():
     """Nobody is refused; in one of eleven, skin sinks deeper or stays farther off than it may."""
-    people = (0, 4, 5, 102, 104, 108)
+    people = (0, 5, 102, 108)
     unclean = []
     for number in people:
         for name in NAMES:
