@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from app.joint_work import JointOrder
-from app.look import View
+from app.shown.look import View
+from app.work.joint_work import JointOrder
 from handstudio.export.part import Content
 from handstudio.hand.skeleton import HandType
 from handstudio.wizards import course
