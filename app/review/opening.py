@@ -34,7 +34,7 @@ from handstudio.setup import Setup
 
 @dataclass
 class Opening:
-    """Owner of the review in the state."""
+    """Opens takes, and brings the open one up to what is asked for and to what is there."""
 
     board: Board
     reviewer: Reviewer
