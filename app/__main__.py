@@ -13,12 +13,12 @@ from pathlib import Path
 from types import FrameType
 
 from app import intents
-from app.jobs import Jobs
 from app.journal import Journal
-from app.preparing import Preparation
 from app.server import HOST, Server
 from app.state import State
 from app.studio import Studio
+from app.work.jobs import Jobs
+from app.work.preparing import Preparation
 from handstudio import __version__
 from handstudio.device.capture import Capture
 from handstudio.device.orders import HeadingTaken, TakeDone

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from app.joint_work import JointOrder
-from app.look import View
+from app.shown.look import View
+from app.work.joint_work import JointOrder
 from handstudio.export.part import Content
 from handstudio.hand.skeleton import HandType
 from handstudio.wizards import course
+
+# --- devices --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +40,17 @@ class BlinkSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class SetFilter:
-    """Fuse by the filter of this name from now on; empty: by the one that suits the device."""
+class Perform:
+    """Let the wearer of the virtual glove do this."""
 
-    name: str
+    motions: str
+
+
+@dataclass(frozen=True, slots=True)
+class ResetHeading:
+    """Take the heading anew, of one sensor or, with None, of all."""
+
+    sensor: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +73,37 @@ class ChooseTracker:
     sensor: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Perform:
-    """Let the wearer of the virtual glove do this."""
+OfDevices: TypeAlias = (
+    FindDevices
+    | ConnectDevice
+    | DisconnectDevice
+    | BlinkSensor
+    | Perform
+    | ResetHeading
+    | FindTrackers
+    | ChooseTracker
+)
 
-    motions: str
+# --- recording ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleRecording:
+    """Start a take, or end the one that is on, or the count before it."""
+
+    page: int = -1  # which page asked: it may have to be asked back
+
+
+@dataclass(frozen=True, slots=True)
+class PutMark:
+    """This moment is worth finding again, in the take that is recorded or open."""
+
+    text: str = ""
+
+
+OfRecording: TypeAlias = ToggleRecording | PutMark
+
+# --- subjects -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,172 +125,16 @@ class SaveSubject:
 
 
 @dataclass(frozen=True, slots=True)
-class SetVisit:
-    """What this visit is called; empty: by its day."""
+class DeleteSubject:
+    """A person and all that was recorded of them goes for good."""
 
-    name: str
+    code: str
+    typed: str
 
 
-@dataclass(frozen=True, slots=True)
-class SetTakeName:
-    """What the next takes are called."""
+OfSubjects: TypeAlias = ChooseSubject | SaveSubject | DeleteSubject
 
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class SetHandType:
-    """How the next calibration divides the palm."""
-
-    hand_type: HandType
-
-
-@dataclass(frozen=True, slots=True)
-class SetCountdown:
-    """How long to count before a take begins [s]; 0: not at all."""
-
-    seconds: int
-
-
-@dataclass(frozen=True, slots=True)
-class SetSounds:
-    """Whether start, stop and marks are to be heard."""
-
-    on: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SetTheme:
-    """A dark page or a light one."""
-
-    dark: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SetLanguage:
-    """The language of the page; empty: the browser's, or the system's."""
-
-    language: str
-
-
-@dataclass(frozen=True, slots=True)
-class SetView:
-    """Look at the hand from there."""
-
-    view: View
-
-
-@dataclass(frozen=True, slots=True)
-class SetShown:
-    """Show or hide a kind of thing on the hand."""
-
-    part: str
-    on: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ToggleShown:
-    """Show it where it is hidden, hide it where it is shown."""
-
-    part: str
-
-
-@dataclass(frozen=True, slots=True)
-class GoOn:
-    """The space bar: play or pause the open take; else record or stop."""
-
-    page: int
-
-
-@dataclass(frozen=True, slots=True)
-class ZoomPlots:
-    """So many times less time in the plots of the open take."""
-
-    factor: float
-
-
-@dataclass(frozen=True, slots=True)
-class PanPlots:
-    """The plots of the open take go on by this share of their time, or back."""
-
-    share: float
-
-
-@dataclass(frozen=True, slots=True)
-class ShiftComparison:
-    """Lay the begin of the take that is compared with so much later than the open one's [s]."""
-
-    later_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class FitPlots:
-    """The part that counts fills the plots, or the whole take where it does already."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChooseCurves:
-    """Plot this set of curves; of signals, those of the sensor of this name."""
-
-    name: str
-    sensor: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class AddTake:
-    """Copy a take from elsewhere into the library: a file here, or one that a page sent."""
-
-    name: str
-    content: bytes | None = None  # None: the name is a path of this computer
-
-
-@dataclass(frozen=True, slots=True)
-class ShareTake:
-    """Send the open take and its notes to the page, as one file."""
-
-    page: int
-
-
-@dataclass(frozen=True, slots=True)
-class TrimTake:
-    """The part of the open take that counts becomes a take of its own, called so."""
-
-    name: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class PutMark:
-    """This moment is worth finding again, in the take that is recorded or open."""
-
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class RemoveMark:
-    """The mark at this time [s] goes."""
-
-    at_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class GoToMark:
-    """On to the next mark of the open take, or back to the one before."""
-
-    forward: bool
-
-
-@dataclass(frozen=True, slots=True)
-class NamePart:
-    """The part of the open take that counts is called so."""
-
-    label: str
-
-
-@dataclass(frozen=True, slots=True)
-class SetNotes:
-    """The words beside the open take."""
-
-    text: str
+# --- the library ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,55 +172,37 @@ class RestoreTake:
 
 
 @dataclass(frozen=True, slots=True)
-class ComputeRest:
-    """Of the open take only the first seconds are there: compute the rest after all."""
-
-
-@dataclass(frozen=True, slots=True)
-class CancelWork:
-    """The long work that is on is no longer wanted."""
-
-
-@dataclass(frozen=True, slots=True)
 class EmptyBin:
     """What is in the bin goes for good."""
 
 
 @dataclass(frozen=True, slots=True)
-class DeleteSubject:
-    """A person and all that was recorded of them goes for good."""
+class AddTake:
+    """Copy a take from elsewhere into the library: a file here, or one that a page sent."""
 
-    code: str
-    typed: str
-
-
-@dataclass(frozen=True, slots=True)
-class SendDiagnostics:
-    """A file for whoever helps, without anything of the people recorded."""
-
-    page: int
+    name: str
+    content: bytes | None = None  # None: the name is a path of this computer
 
 
 @dataclass(frozen=True, slots=True)
-class PagesOpen:
-    """So many pages are open, and the languages the newest asks for, best first."""
+class TrimTake:
+    """The part of the open take that counts becomes a take of its own, called so."""
 
-    count: int
-    languages: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class ToggleRecording:
-    """Start a take, or end the one that is on, or the count before it."""
-
-    page: int = -1  # which page asked: it may have to be asked back
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class PageShown:
-    """The slowest page answered what it was sent after so long [ms]; None: none answers."""
+class RecoverTake:
+    """Get back what was saved of an interrupted recording."""
 
-    ms: float | None
+    path: Path
+
+
+OfLibrary: TypeAlias = (
+    Search | RenameTake | BinTake | Undo | RestoreTake | EmptyBin | AddTake | TrimTake | RecoverTake
+)
+
+# --- the open take: what is shown of it -----------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,20 +213,52 @@ class OpenTake:
 
 
 @dataclass(frozen=True, slots=True)
-class RecoverTake:
-    """Get back what was saved of an interrupted recording."""
-
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
 class ShowLive:
     """Leave the take, show the hand as it is now."""
 
 
 @dataclass(frozen=True, slots=True)
+class ComputeRest:
+    """Of the open take only the first seconds are there: compute the rest after all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Smooth:
+    """Show the open take with its future taken in, or as it was live."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """Show the open take a second time, by another filter or smoothed; empty: no more."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseCurves:
+    """Plot this set of curves; of signals, those of the sensor of this name."""
+
+    name: str
+    sensor: str = ""
+
+
+OfOpenTake: TypeAlias = OpenTake | ShowLive | ComputeRest | Smooth | Compare | ChooseCurves
+
+# --- the open take: which moment, which part ------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
 class TogglePlay:
     """Play, or pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoOn:
+    """The space bar: play or pause the open take; else record or stop."""
+
+    page: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -383,10 +276,24 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class GoToMark:
+    """On to the next mark of the open take, or back to the one before."""
+
+    forward: bool
+
+
+@dataclass(frozen=True, slots=True)
 class SetSpeed:
     """How fast to play; 1 is as it was."""
 
     factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetLoop:
+    """Whether playing begins again at the end."""
+
+    on: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -405,19 +312,75 @@ class WholeTake:
 
 
 @dataclass(frozen=True, slots=True)
-class SetLoop:
-    """Whether playing begins again at the end."""
+class ZoomPlots:
+    """So many times less time in the plots of the open take."""
 
-    on: bool
+    factor: float
 
 
 @dataclass(frozen=True, slots=True)
-class Export:
-    """Write a file into the library and send it to a page."""
+class PanPlots:
+    """The plots of the open take go on by this share of their time, or back."""
 
-    content: Content | None  # None: the format has one, or a first
-    page: int  # which open page asked
-    format: str = "csv"
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class FitPlots:
+    """The part that counts fills the plots, or the whole take where it does already."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShiftComparison:
+    """Lay the begin of the take that is compared with so much later than the open one's [s]."""
+
+    later_s: float
+
+
+Move: TypeAlias = (
+    TogglePlay
+    | GoOn
+    | Seek
+    | Step
+    | GoToMark
+    | SetSpeed
+    | SetLoop
+    | MarkIn
+    | MarkOut
+    | WholeTake
+    | ZoomPlots
+    | PanPlots
+    | FitPlots
+    | ShiftComparison
+)
+
+# --- the open take: notes -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class NamePart:
+    """The part of the open take that counts is called so."""
+
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetNotes:
+    """The words beside the open take."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveMark:
+    """The mark at this time [s] goes."""
+
+    at_s: float
+
+
+OfNotes: TypeAlias = NamePart | SetNotes | RemoveMark
+
+# --- the open take: measures ----------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -463,23 +426,44 @@ class MakeReport:
     page: int
 
 
-@dataclass(frozen=True, slots=True)
-class Smooth:
-    """Show the open take with its future taken in, or as it was live."""
+OfMeasures: TypeAlias = (
+    CompareVisits | CompareSides | MeasureHand | AddPosture | RemovePosture | MakeReport
+)
 
-    on: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Compare:
-    """Show the open take a second time, by another filter or smoothed; empty: no more."""
-
-    name: str
+# --- files ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
-class FaceForward:
-    """Turn the picture so that the forearm points away from the viewer."""
+class Export:
+    """Write a file into the library and send it to a page."""
+
+    content: Content | None  # None: the format has one, or a first
+    page: int  # which open page asked
+    format: str = "csv"
+
+
+@dataclass(frozen=True, slots=True)
+class ShareTake:
+    """Send the open take and its notes to the page, as one file."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
+class SendDiagnostics:
+    """A file for whoever helps, without anything of the people recorded."""
+
+    page: int
+
+
+@dataclass(frozen=True, slots=True)
+class CancelWork:
+    """The long work that is on is no longer wanted."""
+
+
+OfFiles: TypeAlias = Export | ShareTake | SendDiagnostics | CancelWork
+
+# --- guided courses -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -522,11 +506,9 @@ class UseCalibration:
     which: Literal["none", "again", "previous"]
 
 
-@dataclass(frozen=True, slots=True)
-class ResetHeading:
-    """Take the heading anew, of one sensor or, with None, of all."""
+OfCourses: TypeAlias = BeginCourse | Guide | RedoStep | LeaveCourse | CloseResult | UseCalibration
 
-    sensor: str | None = None
+# --- joints by trackers ---------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -557,87 +539,138 @@ class CloseJoint:
     """What came of finding a joint was seen; or it is no longer wanted."""
 
 
-Move: TypeAlias = TogglePlay | Seek | Step | SetSpeed | MarkIn | MarkOut | WholeTake | SetLoop
-"""What moves through the open take."""
+OfJoints: TypeAlias = GiveTracks | FindJoint | TryVirtualFinger | CloseJoint
 
-Intent: TypeAlias = (
-    FindDevices
-    | ConnectDevice
-    | DisconnectDevice
-    | BlinkSensor
-    | SetFilter
-    | FindTrackers
-    | ChooseTracker
-    | Perform
-    | ChooseSubject
-    | SaveSubject
-    | SetVisit
+# --- pages ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class PagesOpen:
+    """So many pages are open, and the languages the newest asks for, best first."""
+
+    count: int
+    languages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PageShown:
+    """The slowest page answered what it was sent after so long [ms]; None: none answers."""
+
+    ms: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetLanguage:
+    """The language of the page; empty: the browser's, or the system's."""
+
+    language: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetView:
+    """Look at the hand from there."""
+
+    view: View
+
+
+@dataclass(frozen=True, slots=True)
+class FaceForward:
+    """Turn the picture so that the forearm points away from the viewer."""
+
+
+OfPages: TypeAlias = PagesOpen | PageShown | SetLanguage | SetView | FaceForward
+
+# --- preferences ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SetVisit:
+    """What this visit is called; empty: by its day."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetTakeName:
+    """What the next takes are called."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetHandType:
+    """How the next calibration divides the palm."""
+
+    hand_type: HandType
+
+
+@dataclass(frozen=True, slots=True)
+class SetCountdown:
+    """How long to count before a take begins [s]; 0: not at all."""
+
+    seconds: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetSounds:
+    """Whether start, stop and marks are to be heard."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetFilter:
+    """Fuse by the filter of this name from now on; empty: by the one that suits the device."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetTheme:
+    """A dark page or a light one."""
+
+    dark: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetShown:
+    """Show or hide a kind of thing on the hand."""
+
+    part: str
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleShown:
+    """Show it where it is hidden, hide it where it is shown."""
+
+    part: str
+
+
+Preference: TypeAlias = (
+    SetVisit
     | SetTakeName
     | SetHandType
     | SetCountdown
     | SetSounds
+    | SetFilter
     | SetTheme
-    | SetLanguage
-    | SetView
     | SetShown
     | ToggleShown
-    | GoOn
-    | PutMark
-    | RemoveMark
-    | GoToMark
-    | NamePart
-    | SetNotes
-    | Search
-    | RenameTake
-    | BinTake
-    | Undo
-    | RestoreTake
-    | ComputeRest
-    | CancelWork
-    | EmptyBin
-    | DeleteSubject
-    | SendDiagnostics
-    | PagesOpen
-    | PageShown
-    | ToggleRecording
-    | ZoomPlots
-    | PanPlots
-    | ShiftComparison
-    | FitPlots
-    | ChooseCurves
-    | TrimTake
-    | AddTake
-    | ShareTake
-    | OpenTake
-    | RecoverTake
-    | ShowLive
-    | TogglePlay
-    | Seek
-    | Step
-    | SetSpeed
-    | MarkIn
-    | MarkOut
-    | WholeTake
-    | SetLoop
-    | Export
-    | CompareVisits
-    | CompareSides
-    | MeasureHand
-    | MakeReport
-    | AddPosture
-    | RemovePosture
-    | Smooth
-    | Compare
-    | FaceForward
-    | BeginCourse
-    | Guide
-    | RedoStep
-    | LeaveCourse
-    | CloseResult
-    | UseCalibration
-    | ResetHeading
-    | GiveTracks
-    | FindJoint
-    | TryVirtualFinger
-    | CloseJoint
+)
+
+Intent: TypeAlias = (
+    OfDevices
+    | OfRecording
+    | OfSubjects
+    | OfLibrary
+    | OfOpenTake
+    | Move
+    | OfNotes
+    | OfMeasures
+    | OfFiles
+    | OfCourses
+    | OfJoints
+    | OfPages
+    | Preference
 )

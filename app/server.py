@@ -11,11 +11,11 @@ import viser
 from app import intents
 from app.door import network
 from app.door.guard import Door, guarded, made_token
-from app.look import View
 from app.page_probe import PageProbe
 from app.panels.page import Page
-from app.scene import Scene
-from app.state import Download, Message, State
+from app.picture.scene import Scene
+from app.shown.look import View
+from app.state import Message, State
 from app.studio import Studio
 from app.views.comparison import compared_ghost
 from app.views.course import ghost_view
@@ -25,6 +25,7 @@ from app.views.page import HandView, camera_of, looks_near, overlay_of, scene_of
 from app.views.room import floor_m, stand_of
 from app.views.written import trace_view
 from app.words import _
+from app.work.outcomes import Download
 
 HOST = "127.0.0.1"
 

@@ -6,14 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from app.guided import Guided, InUse, Result, Stand
-from app.joint_work import JointAnswer, TrackFile
-from app.live import LiveHistory
-from app.look import View
-from app.review import Review
-from app.shaken import Shaking
+from app.shown.guided import Guided, InUse, Result, Stand
+from app.shown.live import LiveHistory
+from app.shown.look import View
+from app.shown.review import Review
+from app.shown.shaken import Shaking
+from app.shown.taking import BLIP_S, Countdown, Disk
 from app.sounds import Sound
-from app.taking import BLIP_S, Countdown, Disk
+from app.work.joint_work import JointAnswer, TrackFile
+from app.work.outcomes import Download, Work
 from handstudio.arrays import Array
 from handstudio.device import find
 from handstudio.device.find import Found
@@ -24,6 +25,7 @@ from handstudio.recording.bin import Binned
 from handstudio.recording.library import Entry
 from handstudio.recording.subjects import Subject
 from handstudio.settings import Settings
+from handstudio.setup import HandModel
 from handstudio.wizards.joint_course import JointCourse
 
 HAND_LENGTH_MM = (120.0, 240.0)
@@ -41,23 +43,6 @@ class Message:
     text: str
     remedy: str = ""
     alarm: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Download:
-    """A file for one page: one that exists, or one that was made for it."""
-
-    page: int
-    name: str
-    content: Path | bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """A job that runs, in words, and how far it is."""
-
-    words: str
-    share: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,3 +171,8 @@ class State:
         subject = self.subject
         measured = subject.hand_length_mm if subject is not None else None
         return self.settings.hand_length_mm if measured is None else measured
+
+    @property
+    def hand(self) -> HandModel:
+        """The hand of whoever is chosen now, before any calibration."""
+        return HandModel(hand_length_m=self.hand_length_mm * 1e-3)

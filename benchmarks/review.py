@@ -26,13 +26,13 @@ import numpy as np
 import tyro
 
 from app import intents
-from app.jobs import Jobs
 from app.state import State
 from app.studio import Studio
 from app.views import timeline
 from app.views.comparison import compared_ghost
 from app.views.page import caption_of, curves_of, scene_of
 from app.views.written import trace_picture, trace_view
+from app.work.jobs import Jobs
 from handstudio.device.capture import Capture
 from handstudio.finds import found_in
 from handstudio.process import process

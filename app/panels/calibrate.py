@@ -8,9 +8,9 @@ from typing import Any, Literal, TypeAlias
 import viser
 
 from app import intents
-from app.guided import Stand
 from app.panels.base import QUIET, Send, page_of, put, typed
 from app.panels.joint import JointFolder
+from app.shown.guided import Stand
 from app.state import State
 from app.views import calibration as calibration_view
 from app.views import course as view

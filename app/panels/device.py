@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from app import intents
-from app.filtering import wanted_of
+from app.devices.filtering import wanted_of
 from app.panels.base import QUIET, Send, put, typed
 from app.panels.tracker import TrackerPanel
 from app.panels.virtual import VirtualPanel

@@ -7,11 +7,11 @@ from typing import Any
 import viser
 
 from app import intents
-from app.joint_work import ACROSS, Across, JointOrder
 from app.panels.base import QUIET, Send, put
 from app.state import State
 from app.views import joint as view
 from app.words import _
+from app.work.joint_work import ACROSS, Across, JointOrder
 
 _NONE = "–"
 _STEP_PX, _ANSWER_PX = (660.0, 300.0), (660.0, 470.0)  # the hand stays in sight above

@@ -9,11 +9,11 @@ from typing import Any
 import viser
 
 from app import intents
-from app.comparison import OF_TAKE
 from app.panels.base import QUIET, Send, page_of, put, typed
 from app.panels.measures import MeasuresFolder
 from app.panels.sheets import ask_deletion, ask_emptying
-from app.review import Review
+from app.shown.comparison import OF_TAKE
+from app.shown.review import Review
 from app.state import Shelf, State
 from app.views.comparison import choices
 from app.views.formats import contents, offered

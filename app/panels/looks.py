@@ -7,8 +7,8 @@ from typing import Any
 import viser
 
 from app import intents
-from app.look import View
 from app.panels.base import QUIET, Send, page_of, put, typed
+from app.shown.look import View
 from app.state import State
 from app.words import LANGUAGES, _
 

@@ -9,7 +9,6 @@ import viser
 from viser._messages import HotkeyKey
 
 from app import intents, sounds
-from app.look import View
 from app.panels.base import QUIET, Send, page_of, put
 from app.panels.calibrate import CalibratePanel, CoursePanel
 from app.panels.device import DevicePanel
@@ -19,6 +18,7 @@ from app.panels.looks import LooksPanel
 from app.panels.plots import PlotsPanel
 from app.panels.record import RecordButton, RecordingPanel, RecordPanel, ask_subject
 from app.panels.transport import TransportPanel
+from app.shown.look import View
 from app.state import State
 from app.views import health as health_view
 from app.views import page as view

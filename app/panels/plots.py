@@ -9,8 +9,8 @@ import viser
 from viser import uplot
 
 from app import colours, intents
-from app.channels import Curve, Plot
 from app.panels.base import Send, put, typed
+from app.shown.channels import Curve, Plot
 from app.views.page import Curves
 from app.words import _
 from handstudio.arrays import Array

@@ -8,7 +8,7 @@ import viser
 
 from app import intents
 from app.panels.base import QUIET, Send, put, typed
-from app.review import SPEEDS, Review
+from app.shown.review import SPEEDS, Review
 from app.state import State
 from app.views import timeline
 from app.views.course import sheet_of

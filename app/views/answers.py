@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.solving import Answer
 from app.views.pieces import AMBER, GREEN, RED, big, line, sentence, small, table
 from app.views.steps import failing_of, figure_of, joint_name
 from app.words import _
+from app.work.solving import Answer
 from handstudio.calibrate import Calibrated
 from handstudio.calibrate_sensors import SensorsFound
 from handstudio.calibration.allan import AxisNoise, Density, mean_of

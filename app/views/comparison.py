@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.comparison import SMOOTHED, Comparison
+from app.shown.comparison import SMOOTHED, Comparison
 from app.state import State
 from app.views.course import GhostView
 from app.views.filters import filter_words

@@ -10,9 +10,9 @@ from typing import TypeAlias
 from jaxtyping import Bool
 
 from app import intents
-from app.courses import stands_without_device
-from app.ghost import ghost_of
-from app.guided import Guided, Result, Stand
+from app.guidance.courses import stands_without_device
+from app.guidance.ghost import ghost_of
+from app.shown.guided import Guided, Result, Stand
 from app.state import State
 from app.views.answers import answer_of
 from app.views.pieces import AMBER, GREEN, GREY, RED, big, frame, line, sentence, small, table

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from app.bones import hand_length, joint_radii
-from app.joint_work import FINDABLE, JointAnswer, TrackFile
 from app.report.names import about_name
+from app.shown.bones import hand_length, joint_radii
 from app.state import JointFinding, State
 from app.views.joint_plots import class_histogram, cloud_picture
 from app.views.page import HandView, SensorsView
 from app.views.pieces import AMBER, GREEN, GREY, RED, big, line, sentence, small, table
 from app.words import _, in_words
+from app.work.joint_work import FINDABLE, JointAnswer, TrackFile
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
 from handstudio.hand.skeleton import JOINTS, SEGMENTS

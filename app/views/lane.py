@@ -6,7 +6,7 @@ import html
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from app.review import Review
+from app.shown.review import Review
 from app.views.written import grasp_words
 from app.words import _
 from handstudio.analysis.writing import Writing

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.report.names import about_name, grade_word, why_words
 from app.report.tables import Table, is_short, tables_of
-from app.review import Review
+from app.shown.review import Review
 from app.state import State
 from app.views.pieces import AMBER, GREEN
 from app.words import _

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from app.channels import OF_TAKES, SIGNALS, Plot, plots_of, sets_of
-from app.live import SPAN_S
-from app.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lowered
+from app.shown.channels import OF_TAKES, SIGNALS, Plot, plots_of, sets_of
+from app.shown.live import SPAN_S
+from app.shown.look import ABOVE_SHEET, Camera, View, camera_for, course_camera, lowered
 from app.state import State
 from app.views.comparison import comparison_words
 from app.views.health import worst_of

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.look import Camera
-from app.review import Review
+from app.shown.look import Camera
+from app.shown.review import Review
 from app.state import State
 from app.words import _
 from handstudio.analysis.writing import Writing

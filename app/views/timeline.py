@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator
 
-from app.review import Review
+from app.shown.review import Review
 from app.views import lane
 from app.views.written import grasp_words
 from app.words import _, language

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from app.review import Review
+from app.shown.review import Review
 from app.state import State
 from app.views.room import stand_of_writing
 from app.words import _

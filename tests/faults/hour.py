@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from app import intents
-from app.jobs import Jobs
 from app.state import State
 from app.studio import Studio
+from app.work.jobs import Jobs
 from benchmarks.probes import rss_bytes
 from handstudio.device import capture as capture_module
 from handstudio.device.capture import Capture

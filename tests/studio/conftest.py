@@ -11,13 +11,13 @@ from typing import Any, cast
 import pytest
 
 from app import intents
-from app import review as reviewing
-from app.jobs import Beside, Jobs
-from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
-from app.review import Review
+from app.shown import review as reviewing
+from app.shown.review import Review
 from app.state import State
 from app.studio import Studio
+from app.work.jobs import Beside, Jobs
+from app.work.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.device.capture import Capture

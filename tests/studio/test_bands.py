@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.channels import plots_of, sds_of
-from app.live import extended
 from app.panels.plots import _data, _edges
-from app.review import Review, opened
+from app.shown.channels import plots_of, sds_of
+from app.shown.live import extended
+from app.shown.review import Review, opened
 from app.studio import Studio
 from app.views.page import curves_of
 from handstudio.pipeline import Motion

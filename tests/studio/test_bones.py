@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.boards import BOARD_M, boards_of
-from app.bones import bone_sets
-from app.meshes import mesh
+from app.picture.boards import BOARD_M, boards_of
+from app.picture.meshes import mesh
+from app.shown.bones import bone_sets
 from handstudio.hand.angles import compose
 from handstudio.hand.pose import posed
 from handstudio.hand.skeleton import (

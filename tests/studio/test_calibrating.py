@@ -13,8 +13,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from app import courses, intents
-from app.calibrating import manner_of, performs
+from app import intents
+from app.guidance import courses
+from app.guidance.calibrating import manner_of, performs
 from app.sounds import Sound
 from app.state import State
 from app.studio import Studio
@@ -161,7 +162,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def guided(streaming: Studio, capture: StillCapture) -> Guided:
-    streaming._calibrator.judge = Judge()
+    streaming._guide.calibrator.judge = Judge()
     after(streaming, intents.SetSounds(on=True))
     return Guided(streaming, capture)
 

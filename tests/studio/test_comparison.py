@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import comparison, intents
-from app.comparison import SMOOTHED, compared, setup_of
-from app.review import Review, compared_with, panned, zoomed
+from app import intents
+from app.shown import comparison
+from app.shown.comparison import SMOOTHED, compared, setup_of
+from app.shown.review import Review, compared_with, panned, zoomed
 from app.state import State
 from app.studio import Studio
 from app.views.comparison import choices, compared_ghost

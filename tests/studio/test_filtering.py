@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from app import intents
-from app.filtering import wanted_of
+from app.devices.filtering import wanted_of
 from app.studio import Studio
 from app.views.filters import filter_words, preparing_of
 from handstudio.device.orders import SetFilter

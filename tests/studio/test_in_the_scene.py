@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from app import review as reviewing
-from app.comparison import compared
-from app.look import FIELD_RAD
-from app.review import Review
+from app.shown import review as reviewing
+from app.shown.comparison import compared
+from app.shown.look import FIELD_RAD
+from app.shown.review import Review
 from app.state import State
 from app.views.comparison import compared_ghost
 from app.views.held import held_view

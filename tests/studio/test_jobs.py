@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.jobs import Jobs, Stopped
+from app.work.jobs import Jobs, Stopped
 from handstudio.process import kept_motion
 from handstudio.recording.simulated import simulate
 from handstudio.recording.take import open_take

@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 from app import intents
-from app.joint_work import (
+from app.state import State
+from app.studio import Studio
+from app.views import joint as view
+from app.views.page import scene_of
+from app.work.joint_work import (
     FINDABLE,
     Finger,
     JointAnswer,
@@ -19,10 +23,6 @@ from app.joint_work import (
     off_truth_m,
     virtual_finger,
 )
-from app.state import State
-from app.studio import Studio
-from app.views import joint as view
-from app.views.page import scene_of
 from handstudio.arrays import Array
 from handstudio.errors import TrackError
 from handstudio.maths import so3

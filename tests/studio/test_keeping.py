@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from app import intents
-from app.keeping import Keeper
 from app.studio import Studio
+from app.takes.keeping import Keeper
 from app.views import timeline
 from handstudio.process import process
 from handstudio.recording.notes import load_notes

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.channels import plots_of, values_of
-from app.live import SPAN_S, extended
-from app.review import Review
+from app.shown.channels import plots_of, values_of
+from app.shown.live import SPAN_S, extended
+from app.shown.review import Review
 
 
 @pytest.mark.parametrize("piece", [1, 3, 17, 500])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app import intents
-from app.review import Review
+from app.shown.review import Review
 from app.state import State
 from app.studio import Studio
 from app.views import measures as view

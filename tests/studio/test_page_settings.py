@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from app import intents, words
-from app.jobs import Jobs
-from app.look import ABOVE_SHEET, FIELD_RAD, View, camera_for
-from app.review import Review
+from app.shown.look import ABOVE_SHEET, FIELD_RAD, View, camera_for
+from app.shown.review import Review
 from app.state import State
 from app.studio import Studio
 from app.views import calibration as calibration_view
 from app.views import health as health_view
 from app.views.page import HandView, camera_of, overlay_of, scene_of, status_of
 from app.views.room import stand_of, standing
+from app.work.jobs import Jobs
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Phase
 from handstudio.health.findings import PER_SENSOR, Finding, Kind

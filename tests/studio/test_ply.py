@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.ply import read_ply
+from app.picture.ply import read_ply
 
 MESHES = sorted((Path(__file__).parents[2] / "assets" / "meshes").glob("*.ply"))
 

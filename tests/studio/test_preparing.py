@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from app.preparing import Preparation
+from app.work.preparing import Preparation
 
 _AT_START = """
 import sys, app.__main__, app.studio, app.server

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import review as reviewing
-from app.review import Review
+from app.shown import review as reviewing
+from app.shown.review import Review
 from handstudio.errors import TakeError
 from handstudio.pipeline import empty
 from handstudio.recording.take import Take

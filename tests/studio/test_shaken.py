@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app import shaken
-from app.review import Review
+from app.shown import shaken
+from app.shown.review import Review
 from handstudio.maths import so3
 from handstudio.pipeline import Doubt, Motion, unsure
 

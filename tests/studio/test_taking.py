@@ -7,8 +7,9 @@ import wave
 
 import pytest
 
-from app import sounds, taking
-from app.taking import Countdown, Disk, Ending, Watch
+from app import sounds
+from app.shown import taking
+from app.shown.taking import Countdown, Disk, Ending, Watch
 
 
 def test_the_count_is_three_two_one() -> None:

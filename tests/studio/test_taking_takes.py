@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from app import intents, taking
+from app import intents
+from app.shown import taking
+from app.shown.taking import BLIP_S
 from app.sounds import Sound
 from app.studio import Studio
-from app.taking import BLIP_S
 from app.views import recording as recording_view
 from handstudio.device.orders import Phase, StartTake, StopTake
 from handstudio.recording.notes import load_notes

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from app import intents
-from app.review import Review
+from app.devices.tracking import facts_of, with_tracker
+from app.shown.review import Review
 from app.state import State, Tracking
 from app.studio import Studio
-from app.tracking import facts_of, with_tracker
 from app.views.page import HandView, scene_of
 from app.views.tracker import tracker_words
 from handstudio.device.following import RootNow, RootPhase

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.review import Review
+from app.shown.review import Review
 from app.studio import Studio
 from app.views import health as health_view
 from app.views.trust import UNSURE_DEG, distrusted, surest_words

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from app import intents
-from app import review as reviewing
-from app.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
-from app.comparison import OF_TAKE
-from app.jobs import Stopped
-from app.review import Review
-from app.review import opened as opened_review
+from app.shown import review as reviewing
+from app.shown.channels import SIGNALS, SPEEDS, plots_of, sets_of, values_of
+from app.shown.comparison import OF_TAKE
+from app.shown.review import Review
+from app.shown.review import opened as opened_review
 from app.state import State
 from app.studio import Studio
 from app.views import lane, timeline
 from app.views.page import caption_of, curves_of
+from app.work.jobs import Stopped
 from handstudio.analysis.grasps import GraspSegment, Recognised
 from handstudio.analysis.pen_tip import Plane
 from handstudio.analysis.stretches import Stretch
@@ -211,7 +211,7 @@ def test_the_first_seconds_are_there_before_the_rest(
     assert "first seconds" in caption_of(state)
     after(studio, intents.Seek(1.5))
     motion = process(take)
-    studio._show_computed(take)
+    studio._opening._computed(take)
     review = studio.state.review
     assert review is not None
     assert not review.partial

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from app.channels import OF_TAKES, OVERVIEW, sds_of, sets_of, values_of
+from app.shown.channels import OF_TAKES, OVERVIEW, sds_of, sets_of, values_of
 from handstudio.arrays import Array
 from handstudio.pipeline import Motion, empty, join
 from handstudio.setup import Setup

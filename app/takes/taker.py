@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from app import taking
+from app.shown import taking
+from app.shown.taking import BYTES, Countdown, Disk, Ending, Watch
 from app.sounds import Sound
 from app.state import State
-from app.taking import BYTES, Countdown, Disk, Ending, Watch
 from handstudio.device.capture import Capture
 from handstudio.device.orders import Newest, Phase, StartTake, StopTake
 from handstudio.errors import HandstudioError, TakeError

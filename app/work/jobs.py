@@ -11,9 +11,9 @@ from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import TypeAlias
 
-from app.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
 from app.report.make import report_of, report_path, save_report
-from app.solving import Answer, solve
+from app.work.joint_work import Finger, JointAnswer, JointOrder, find_joint, judged, virtual_finger
+from app.work.solving import Answer, solve
 from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError

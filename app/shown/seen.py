@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int64
 
-from app.channels import SIGNALS, SPEEDS, picked, sds_of, signals_of, speeds_of, values_of
-from app.comparison import Comparison, nearest
+from app.shown.channels import SIGNALS, SPEEDS, picked, sds_of, signals_of, speeds_of, values_of
+from app.shown.comparison import Comparison, nearest
 from handstudio.arrays import Array
 from handstudio.pipeline import Doubt, Motion
 from handstudio.setup import Setup
@@ -23,7 +23,7 @@ class Choice:
     """Which curves are wanted.
 
     Attributes:
-        name: Of the set, see `app.channels.sets_of`.
+        name: Of the set, see `app.shown.channels.sets_of`.
         sensor: Index of the one whose signals are wanted.
     """
 

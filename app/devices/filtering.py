@@ -18,7 +18,7 @@ PLAIN = "vqf"
 
 
 class Prepared(Protocol):
-    """What gets the best filter ready, see `app.preparing.Preparation`."""
+    """What gets the best filter ready, see `app.work.preparing.Preparation`."""
 
     @property
     def ready(self) -> bool:

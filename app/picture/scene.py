@@ -6,14 +6,14 @@ import numpy as np
 import viser
 
 from app import colours
-from app.boards import BOARD_M, Boards, boards_of
-from app.bones import BoneSet, bone_sets, hand_length, joint_radii
-from app.halo import HaloNodes
-from app.held import HeldNodes
-from app.ink import InkNodes
-from app.look import DESK_TARGET, Camera
-from app.meshes import mesh
-from app.skin import SkinNodes
+from app.picture.boards import BOARD_M, Boards, boards_of
+from app.picture.halo import HaloNodes
+from app.picture.held import HeldNodes
+from app.picture.ink import InkNodes
+from app.picture.meshes import mesh
+from app.picture.skin import SkinNodes
+from app.shown.bones import BoneSet, bone_sets, hand_length, joint_radii
+from app.shown.look import DESK_TARGET, Camera
 from app.views.course import GhostView
 from app.views.held import HeldView
 from app.views.joint import HaloView

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from app.guided import Stand
+from app.shown.guided import Stand
 from handstudio.calibration.course import COURSES
 from handstudio.calibration.course import course as steps_of
 from handstudio.errors import CalibrationError, HandstudioError

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from app.board import Board
 from app.intents import CloseJoint, FindJoint, GiveTracks, Intent, TryVirtualFinger
-from app.joint_work import Finger, JointAnswer, TrackFile, unfinished
 from app.state import JointFinding
-from app.workshop import OfJoint, Workshop
+from app.work.joint_work import Finger, JointAnswer, TrackFile, unfinished
+from app.work.outcomes import OfJoint, Outcome
+from app.work.workshop import Workshop
 from handstudio.errors import HandstudioError
 from handstudio.trackers.methods import method_named
 from handstudio.wizards.joint_course import (
@@ -31,6 +33,7 @@ class JointFinder:
         finding: What is shown of it.
     """
 
+    board: Board
     workshop: Workshop
     finding: JointFinding = JointFinding()
     _count: int = 0  # of orders
@@ -65,8 +68,19 @@ class JointFinder:
                 return False
         return True
 
-    def done(self, outcome: OfJoint) -> None:
-        """Something that was ordered is there, or will not be."""
+    def done(self, outcome: Outcome) -> bool:
+        """Take in what was ordered, or why it will not be; False: it is about something else."""
+        if not isinstance(outcome, OfJoint):
+            return False
+        self._take_in(outcome)
+        return True
+
+    def tick(self, elapsed_s: float) -> None:
+        """So much later; the state shows what is found by then."""
+        self._bend_on(elapsed_s)
+        self.board.state = replace(self.board.state, joint=self.finding)
+
+    def _take_in(self, outcome: OfJoint) -> None:
         if outcome.number == self._reading:
             file = outcome.told if isinstance(outcome.told, TrackFile) else None
             problem = outcome.told if isinstance(outcome.told, HandstudioError) else None
@@ -85,7 +99,7 @@ class JointFinder:
                     self.finding, answer=outcome.told, course=None, working=False
                 )
 
-    def tick(self, elapsed_s: float) -> None:
+    def _bend_on(self, elapsed_s: float) -> None:
         """The virtual finger goes on."""
         course, finger = self.finding.course, self._finger
         if course is None or finger is None:

@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from app.comparison import Comparison, compared, seconds_of
-from app.seen import Choice, Seen, seen
+from app.shown.comparison import Comparison, compared, seconds_of
+from app.shown.seen import Choice, Seen, seen
 from handstudio.analysis.stretches import Stretch
 from handstudio.arrays import Array
 from handstudio.errors import TakeError

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app import comparison
-from app import review as reviewing
-from app.channels import OVERVIEW, SIGNALS, sets_of
-from app.review import Review
-from app.seen import Choice
-from app.workshop import Workshop
+from app.shown import comparison
+from app.shown import review as reviewing
+from app.shown.channels import OVERVIEW, SIGNALS, sets_of
+from app.shown.review import Review
+from app.shown.seen import Choice
+from app.work.workshop import Workshop
 from handstudio.finds import kept_finds
 from handstudio.pipeline import Motion
 from handstudio.process import kept_motion

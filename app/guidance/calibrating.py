@@ -6,12 +6,12 @@ import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from app.courses import Courses, Left
-from app.guided import Guided, Result, Stand
-from app.solving import SOLVED, Answer
+from app.guidance.courses import Courses, Left
+from app.shown.guided import Guided, Result, Stand
 from app.sounds import Sound
 from app.state import State
-from app.takes import Taker
+from app.takes.taker import Taker
+from app.work.solving import SOLVED, Answer
 from handstudio.calibration import watching
 from handstudio.device.addresses import VirtualWearer
 from handstudio.device.capture import Capture

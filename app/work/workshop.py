@@ -9,20 +9,35 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.intents import Export
-from app.jobs import Beside, Jobs
-from app.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_into
-from app.solving import Answer
-from app.state import Download, Work
 from app.words import _, language
+from app.work.jobs import Beside, Jobs
+from app.work.joint_work import Finger, JointAnswer, JointOrder, TrackFile, looked_into
+from app.work.outcomes import (
+    Added,
+    Computed,
+    Download,
+    Exported,
+    FoundIn,
+    Gathered,
+    MeasuredPart,
+    OfJoint,
+    Outcome,
+    Previewed,
+    Solved,
+    Surveyed,
+    Trimmed,
+    Uncomputed,
+    Unseen,
+    WayFound,
+    Work,
+    Written,
+)
 from handstudio.analysis.posture_time import Band
 from handstudio.analysis.stretches import Stretch
 from handstudio.errors import HandstudioError
-from handstudio.export.part import Window
+from handstudio.export.part import Content, Window
 from handstudio.finds import Found
 from handstudio.hand.skeleton import HandType
-from handstudio.measure import Measured
-from handstudio.pipeline import Motion
 from handstudio.process import process_head
 from handstudio.recording.parcel import SUFFIX, pack, take_in
 from handstudio.recording.take import Take
@@ -31,128 +46,6 @@ from handstudio.wizards.joint_course import JointCourse, Poses
 
 _IMPORTED = "imported"
 """Whose takes raw folders are that do not say."""
-
-
-@dataclass(frozen=True, slots=True)
-class Computed:
-    """The motion of this take is there now, by its own setup or another."""
-
-    take: Take
-    setup: Setup | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Uncomputed:
-    """The motion of this take, by its own setup or another, will not be there, and why not."""
-
-    take: Take
-    error: HandstudioError
-    own: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Unseen:
-    """Something about this take (as `Review.ordered` names it) will not be known, and why not."""
-
-    take: Take
-    what: str
-    error: HandstudioError
-
-
-@dataclass(frozen=True, slots=True)
-class Previewed:
-    """The first seconds of a take that is being computed."""
-
-    take: Take
-    motion: Motion
-
-
-@dataclass(frozen=True, slots=True)
-class Surveyed:
-    """What wants a second look in this take, by its own setup or another."""
-
-    take: Take
-    setup: Setup | None
-    stretches: tuple[Stretch, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """What the sensors of this take told is there now."""
-
-    take: Take
-
-
-@dataclass(frozen=True, slots=True)
-class WayFound:
-    """The way of the hand of this take in a tracker's room is there now."""
-
-    take: Take
-
-
-@dataclass(frozen=True, slots=True)
-class Trimmed:
-    """A part of a take is a take of its own."""
-
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Added:
-    """A take from elsewhere is in the library."""
-
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Exported:
-    """A file was written, and is wanted by a page."""
-
-    download: Download
-
-
-@dataclass(frozen=True, slots=True)
-class MeasuredPart:
-    """A part of this take was measured."""
-
-    take: Take
-    measured: Measured
-
-
-@dataclass(frozen=True, slots=True)
-class Gathered:
-    """A file was made for a page, and is nowhere else."""
-
-    download: Download
-
-
-@dataclass(frozen=True, slots=True)
-class Solved:
-    """What a course is for was computed, or not, and why not."""
-
-    answer: Answer | HandstudioError
-
-
-@dataclass(frozen=True, slots=True)
-class FoundIn:
-    """What was written and grasped in a take is known now, as its motion by this setup tells."""
-
-    take: Take
-    setup: Setup
-    found: Found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OfJoint:
-    """The next of finding a joint by trackers: what was looked into, bent, found; or why not."""
-
-    number: int  # as it was ordered
-    told: TrackFile | Finger | JointAnswer | HandstudioError
-
-
-Outcome = (Computed | Uncomputed | Unseen | Previewed | Surveyed | Written | MeasuredPart) | (
-    FoundIn | WayFound | Trimmed | Added | Exported | Gathered | Solved | OfJoint
-)
 
 
 @dataclass
@@ -264,17 +157,20 @@ class Workshop:
     def export(
         self,
         path: Path,
-        order: Export,
+        kind: str,
+        content: Content | None,
         window: Window,
+        *,
+        page: int,
         setup: Setup | None = None,
     ) -> None:
-        """A part of a take in some format, beside it, by its own setup or another."""
+        """A part of a take in a format, beside it, by its own setup or another, for a page."""
 
         def use(written: Path) -> Outcome:
-            return Exported(Download(order.page, written.name, written))
+            return Exported(Download(page, written.name, written))
 
-        words = _("Exporting {name}").format(name=f"{path.stem}, {order.format.upper()}")
-        future = self.jobs.export(path, order.format, order.content, window, setup)
+        words = _("Exporting {name}").format(name=f"{path.stem}, {kind.upper()}")
+        future = self.jobs.export(path, kind, content, window, setup)
         self._pending.append(_Pending(future, use, words))
 
     def measure(

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from jaxtyping import Float
 
-from app.bones import hand_length
+from app.shown.bones import hand_length
 from handstudio.arrays import Array
 from handstudio.hand.pose import Pose
 from handstudio.hand.skeleton import SEGMENTS, Skeleton

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.guided import InUse
+from app.shown.guided import InUse
 from app.state import State
 from handstudio.calibration.subject import SubjectCalibration
 from handstudio.device.capture import Capture

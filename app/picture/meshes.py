@@ -7,13 +7,13 @@ from pathlib import Path
 
 from jaxtyping import Float, Int
 
-from app.ply import read_ply
+from app.picture.ply import read_ply
 from handstudio.arrays import Array
 from handstudio.errors import HandstudioError
 
 _PLACES = (
-    Path(__file__).parent / "assets" / "meshes",
     Path(__file__).parents[1] / "assets" / "meshes",
+    Path(__file__).parents[2] / "assets" / "meshes",
 )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
-from app.solving import Answer
+from app.work.solving import Answer
 from handstudio.calibrate import Calibrated
 from handstudio.calibration.device import DeviceCalibration
 from handstudio.calibration.subject import SubjectCalibration

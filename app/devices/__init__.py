@@ -1,0 +1,1 @@
+"""What is connected: gloves, trackers, and the filter that serves them."""

@@ -1,0 +1,1 @@
+"""Guided courses: the hand, the sensors, the heading, joints by trackers."""

@@ -1,0 +1,1 @@
+"""Takes as they are made and kept."""

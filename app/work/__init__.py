@@ -1,0 +1,1 @@
+"""Long work: what runs in processes of its own, and who waits for it."""
