@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 
 class HandstudioError(Exception):
@@ -45,7 +45,7 @@ class HandstudioError(Exception):
         said = {name: _said(value, translate) for name, value in self._values.items()}
         return what.format(**said), remedy.format(**said)
 
-    def about(self, **values: object) -> Self:
+    def about(self, **values: object) -> HandstudioError:
         """The same error with other values, as far as its words hold them."""
         known = {name: value for name, value in values.items() if name in self._values}
         return type(self)(*self._templates, **{**self._values, **known})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -13,21 +14,26 @@ import pytest
 
 DATA_VARIABLE = "HANDSTUDIO_DATA"
 
+_SHAPES, _SHAPES_VARIABLE = "--shapes", "HANDSTUDIO_TEST_SHAPES"
+if _SHAPES in sys.argv:
+    os.environ[_SHAPES_VARIABLE] = "1"  # for the processes that share the work
+if os.environ.get(_SHAPES_VARIABLE):
+    # Here, as conftests in folders below are read before pytest is configured, and import much.
+    # From here on every annotated call into handstudio is checked; a compiled kernel (numba) opts
+    # out with ``@typing.no_type_check`` below ``@compiled``.
+    jaxtyping.install_import_hook("handstudio", "beartype.beartype")
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="also run the tests that take minutes")
     parser.addoption(
-        "--shapes",
+        _SHAPES,
         action="store_true",
         help="also check every call against the shapes and types it declares (twice the time)",
     )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if config.getoption("--shapes"):
-        # Before anything imports handstudio. From here on every annotated call into it is checked;
-        # a compiled kernel (numba) opts out with ``@typing.no_type_check`` below ``@compiled``.
-        jaxtyping.install_import_hook("handstudio", "beartype.beartype")
     # The same examples everywhere and every time: a failure in CI is a failure at the desk.
     hypothesis.settings.register_profile(
         "everywhere",
