@@ -29,7 +29,9 @@ TEXTS_EVERY = 8
 HEALTH_EVERY = 30
 
 _LEFT_PX = 330.0
-_NARROW_PX = 1200  # a page this narrow has no room for hand and plots at once
+_NARROW_PX = 1030
+"""A picture this narrow has no room for plots beside it. When a page first tells its width the left
+column may be off it or not: 1024 px are narrow, and 1366 px are not, either way."""
 _SOUND_TICKS = 90  # a sound is taken away again, or a page opened later would play it
 
 

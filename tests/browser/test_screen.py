@@ -47,7 +47,7 @@ def test_every_state_is_said(
     start_studio: Start, visit: Callable[..., Page], language: str, silent_port: int
 ) -> None:
     """From nothing to a take and a lost device; the language is the browser's."""
-    studio = start_studio(language=language, countdown_s=8.0)  # long enough to be seen
+    studio = start_studio(language=language, countdown_s=5.0)  # long enough to be seen
     page = visit(studio, language=LOCALES[language])
 
     def sees(*texts: str) -> None:
@@ -87,7 +87,7 @@ def test_every_state_is_said(
 
 
 def test_hands_are_free_with_the_space_bar(start_studio: Start, visit: Callable[..., Page]) -> None:
-    studio = start_studio("--virtual", countdown_s=8.0)
+    studio = start_studio("--virtual", countdown_s=4.0)
     page = visit(studio)
     expect(page.get_by_text("Connected")).to_be_visible()
     record(page, 0.5)  # says whose hand it is
