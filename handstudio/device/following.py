@@ -19,11 +19,11 @@ from handstudio.arrays import Array
 from handstudio.device.moves import SPAN_S, Moves, Part
 from handstudio.device.orders import Moved
 from handstudio.errors import CalibrationError
-from handstudio.pipeline import Doubt
 from handstudio.recorded_track import LeastDelayed, on_axis, rising
 from handstudio.recording.tracker_message import Poses, TrackerFacts, joined
-from handstudio.rooted import AGAIN_S, BELIEVED_SD_M, TOLD_S, best_sensor, elbow_of, filter_of
+from handstudio.rooted import BELIEVED_SD_M, TOLD_S, elbow_of
 from handstudio.setup import Setup
+from handstudio.terminal import AGAIN_S, BAD, best_sensor, filter_of
 from handstudio.trackers import late_root
 from handstudio.trackers.clocks import FIRST, TrackerClock, clock_of
 from handstudio.trackers.late_align import Alignment
@@ -42,7 +42,6 @@ _TRUSTED_RAD = 0.05  # attitudes that agree no better may be of a motion that wa
 _RECENT = 60  # poses: a second, of which faults are told
 _LOST = 300  # poses in a row that do not fit: it is sought anew
 _JUMP_US = 60_000_000  # a time axis that goes on so much later is another one
-_BAD = np.uint8(Doubt.UNPLACED | Doubt.SILENT)
 
 
 class RootPhase(Enum):
@@ -189,10 +188,9 @@ class Following:
             return
         self._tried_us = self._axis_us
         whole = self._moves.whole()
-        in_time = msgspec.structs.replace(setup, mean_rates=True)  # `Moves` has seen to it
         try:
             wanted = self.facts.sensor or None
-            found, sensor = best_sensor(in_time, whole.motion, track, wanted, TOLD_S)
+            found, sensor = best_sensor(_in_time(setup), whole.motion, track, wanted, TOLD_S)
         except CalibrationError as error:
             self.newest = replace(self.newest, why=error)
             return
@@ -225,10 +223,12 @@ class Following:
             return
         self._tried_us = self._axis_us
         whole, track = self._moves.whole(), _joined(self._tracks)
-        in_time = msgspec.structs.replace(setup, mean_rates=True)
-        late = before.delay_s + AGAIN_S[0], before.delay_s + AGAIN_S[1]
+        late, wanted = (
+            (before.delay_s + AGAIN_S[0], before.delay_s + AGAIN_S[1]),
+            self.newest.sensor,
+        )
         try:
-            found, _ = best_sensor(in_time, whole.motion, track, self.newest.sensor, late)
+            found, _ = best_sensor(_in_time(setup), whole.motion, track, wanted, late)
         except CalibrationError:
             return  # it rests: what is known is known
         if found.doubt < _BETTER * before.doubt:
@@ -246,7 +246,7 @@ class Following:
         assert state is not None
         k, part = setup.layout.names.index(self.newest.sensor), parts[-1]
         motion = part.motion if felt else part.motion[:0]
-        known = (motion.doubt[:, k] & _BAD) == 0
+        known = (motion.doubt[:, k] & BAD) == 0
         acc = part.acc[: len(motion), k]
         told = Felt(motion.time_us, motion.q_world_sensor[:, k], acc, known)
         placed, state = late_root.run(filter, state, told, _nothing() if track is None else track)
@@ -283,6 +283,11 @@ class Following:
 
 
 _ASTRAY = (Fate.TURNED, Fate.JUMPED, Fate.AFRESH)
+
+
+def _in_time(setup: Setup) -> Setup:
+    """A setup whose attitudes are of their instants as they come: `Moves` has seen to it."""
+    return msgspec.structs.replace(setup, mean_rates=True)
 
 
 def _joined(tracks: deque[Track]) -> Track:

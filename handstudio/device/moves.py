@@ -10,9 +10,9 @@ from handstudio.arrays import Array
 from handstudio.calibration.device import corrected
 from handstudio.device.orders import Moved
 from handstudio.pipeline import Motion, join
-from handstudio.rooted import in_time, is_in_time
 from handstudio.samples import ImuSamples
 from handstudio.setup import Setup
+from handstudio.terminal import in_time, is_in_time
 
 SPAN_S = 25.0
 PACE_HZ = 125.0
@@ -72,7 +72,7 @@ class Moves:
         self.setup, self.parts, self._left, self._before = None, [], [], None
 
     def _timely(self, setup: Setup, motion: Motion) -> Motion:
-        """Attitudes of the instants that they are said to be of, see `rooted.in_time`."""
+        """Attitudes of the instants that they are said to be of, see `terminal.in_time`."""
         if is_in_time(setup):
             return motion
         both = motion if self._before is None else join([self._before, motion])
