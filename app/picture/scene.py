@@ -136,7 +136,7 @@ class Scene:
 
     def _clear_hand(self) -> None:
         self._hand.clear()
-        self._skin.hide()  # kept: pages fail where skin goes that they have only just begun to draw
+        self._skin.hide()
         self._boards.clear()
 
     def _show_sensors(self, view: SensorsView) -> None:
@@ -301,7 +301,7 @@ class _GhostNodes:
         for handle in self._bones.values():
             handle.remove()
         self._bones.clear()
-        self._skin.clear()
+        self._skin.hide()
         if self._label is not None:
             self._label.remove()
             self._label = None

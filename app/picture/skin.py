@@ -14,12 +14,16 @@ from handstudio.hand_surface import skinned
 
 _ABOVE_M = 0.0006  # a patch lies on the skin
 _HATCHING = 0.4
+_INFLUENCES = 4  # bones that carry a vertex, at most, in a page
 _TURNED = 1e-4  # of a quaternion's parts: less, and less than that far, nobody sees
 _MOVED_M = 5e-5
 
 
 class SkinNodes:
     """The skin of one hand in the scene; patches are made when they are first needed.
+
+    Nothing of it is ever removed: a page may fail as a whole where a skinned mesh leaves it. Who is
+    not wanted is hidden, and another hand takes its shape.
 
     Args:
         server: Whose scene.
@@ -33,6 +37,7 @@ class SkinNodes:
         self._mesh: SkinnedMesh | None = None
         self._skin: _Carried | None = None
         self._patches: dict[tuple[int, bool], _Carried] = {}
+        self._outgrown: set[tuple[int, bool]] = set()  # patches that have another hand's shape
 
     def render(
         self,
@@ -52,9 +57,9 @@ class SkinNodes:
             place: Where it stands from where the pose has it [m].
         """
         if skeleton is not self._skeleton or self._skin is None:
-            self.clear()
             self._skeleton, self._mesh = skeleton, skinned(skeleton)
-            self._skin = self._add(self._mesh, colour, opacity)
+            self._skin = self._put_on(self._mesh, colour, opacity)
+            self._outgrown = set(self._patches)
         for name, value in (("color", colour), ("opacity", opacity)):
             if getattr(self._skin.node, name) != value:
                 setattr(self._skin.node, name, value)
@@ -66,9 +71,8 @@ class SkinNodes:
         for key in self._patches.keys() - wanted:
             self._patches[key].hide()
         for segment, gone in wanted:
-            if (segment, gone) not in self._patches and self._mesh is not None:
-                self._patches[segment, gone] = self._patch(self._mesh, segment, gone)
-            self._patches[segment, gone].show(pose)
+            if self._mesh is not None:
+                self._patch(self._mesh, segment, gone).show(pose)
 
     def hide(self) -> None:
         """Out of sight, but kept."""
@@ -77,65 +81,80 @@ class SkinNodes:
         if self._skin is not None:
             self._skin.hide()
 
-    def clear(self) -> None:
-        """Take it off the scene."""
-        for patch in self._patches.values():
-            patch.node.remove()
-        self._patches.clear()
-        if self._skin is not None:
-            self._skin.node.remove()
-        self._skin, self._mesh, self._skeleton = None, None, None
-
-    def _add(
+    def _put_on(
         self, mesh: SkinnedMesh, colour: tuple[int, int, int], opacity: float | None
     ) -> _Carried:
+        weights = mesh.dense_weights()
+        if self._skin is not None:
+            self._skin.reshape(self._server, mesh.vertices, mesh.faces, weights, mesh.bound)
+            return self._skin
         node = self._server.scene.add_mesh_skinned(
             self._name,
             mesh.vertices,
             mesh.faces,
             bone_wxyzs=mesh.bound.q_world_segment,
             bone_positions=mesh.bound.t_world_joint,
-            skin_weights=mesh.dense_weights(),
+            skin_weights=weights,
             color=colour,
             opacity=opacity,
             cast_shadow=self._shadow,
             receive_shadow=False,
         )
-        return _Carried(node, np.arange(len(SEGMENTS)))
+        return _Carried(node)
 
     def _patch(self, mesh: SkinnedMesh, segment: int, dead: bool) -> _Carried:
+        key = segment, dead
+        if key in self._patches and key not in self._outgrown:
+            return self._patches[key]
         part, faces = mesh.part(segment)
         weights = mesh.dense_weights()[part]
-        carrying = np.flatnonzero(weights.any(axis=0))
         lifted = mesh.vertices[part] + _ABOVE_M * mesh.normals()[part]
+        if key in self._patches:
+            self._patches[key].reshape(self._server, lifted, faces, weights, mesh.bound)
+            self._outgrown.remove(key)
+            return self._patches[key]
         node = self._server.scene.add_mesh_skinned(
             f"{self._name}/{SEGMENTS[segment]}{'-dead' if dead else ''}",
             lifted,
             faces,
-            bone_wxyzs=mesh.bound.q_world_segment[carrying],
-            bone_positions=mesh.bound.t_world_joint[carrying],
-            skin_weights=weights[:, carrying],
+            bone_wxyzs=mesh.bound.q_world_segment,
+            bone_positions=mesh.bound.t_world_joint,
+            skin_weights=weights,
             color=colours.DEAD if dead else colours.DOUBT,
             wireframe=not dead,
             opacity=None if dead else _HATCHING,
             cast_shadow=False,
             receive_shadow=False,
         )
-        return _Carried(node, carrying)
+        self._patches[key] = _Carried(node)
+        return self._patches[key]
 
 
 class _Carried:
-    """A skinned mesh that is carried by some segments; only what has moved to be seen is sent."""
+    """A skinned mesh that is carried by segments; only what has moved to be seen is sent."""
 
-    def __init__(self, node: viser.MeshSkinnedHandle, segments: Array) -> None:
-        self.node, self._segments = node, segments
-        self._q, self._place = np.zeros((len(segments), 4)), np.zeros((len(segments), 3))
+    def __init__(self, node: viser.MeshSkinnedHandle) -> None:
+        self.node = node
+        self._q, self._place = np.zeros((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
+
+    def reshape(
+        self, server: viser.ViserServer, vertices: Array, faces: Array, weights: Array, bound: Pose
+    ) -> None:
+        """Take the shape of another hand."""
+        most = np.argsort(weights, axis=1)[:, -_INFLUENCES:]
+        with server.atomic():
+            self.node.vertices, self.node.faces = vertices, faces
+            self.node.skin_indices = most.astype(np.uint16)
+            self.node.skin_weights = np.take_along_axis(weights, most, axis=1)
+            self.node.bone_wxyzs = bound.q_world_segment
+            self.node.bone_positions = bound.t_world_joint
+        self._q[:] = 0.0  # it stands as it was bound until it is moved
 
     def show(self, pose: Pose, beside: Array | None = None) -> None:
         """In a single pose; ``beside`` is where it stands from where the pose has it [m]."""
         if not self.node.visible:
             self.node.visible = True
-        q, place = pose.q_world_segment[self._segments], pose.t_world_joint[self._segments]
+        q, place = pose.q_world_segment, pose.t_world_joint
         if beside is not None:
             place = place + beside
         turned = np.abs(q - self._q).max(axis=1) > _TURNED

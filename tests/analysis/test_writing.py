@@ -112,6 +112,18 @@ def test_a_pen_that_is_held_still_writes_nothing():
     assert found(truth, held_still) == []
 
 
+def test_fingers_that_go_to_and_fro_along_a_line_write_nothing():
+    truth = performed("writing:大")
+    pose, still = truth.pose, np.full(len(truth.time_s), len(truth.time_s) // 2)
+    rng = np.random.default_rng(0)
+    along = 0.04 * np.sin(4.0 * truth.time_s)[:, None] * np.array([0.6, 0.8, 0.0])
+    shaking = 0.0003 * rng.standard_normal((len(still), 3))
+    joints = pose.t_world_joint[still].copy()
+    joints[:, 1:] += (along + shaking)[:, None]  # from the elbow
+    moved = Pose(pose.q_world_segment[still], joints, pose.t_world_tip)
+    assert found(truth, moved) == []
+
+
 def test_no_instant_holds_no_pen():
     truth = performed("writing:大")
     hand = pen_hand(truth.someone.skeleton, 0.187, truth.time_s, truth.pose)

@@ -108,6 +108,10 @@ def test_a_take_is_measured_and_reported_on_the_page(
     page = visit(start_studio(sessions=sessions), 1440, 900)
     page.get_by_role("tab", name="Review").click()
     choose(page, "^one · ")
+    for other in ("VQF", "Nothing"):  # a hand beside it comes, and goes
+        page.get_by_role("combobox", name="Compare with").click()
+        page.get_by_role("option", name=re.compile(other)).first.click()
+        expect(page.get_by_text("pale and dashed: VQF").first).to_be_visible(visible=other == "VQF")
     button(page, "Measure this part").click()
     expect(page.get_by_role("cell", name="Index PIP flexion")).to_be_visible()
     button(page, "All measures").click()
