@@ -16,6 +16,7 @@ from app.shown.comparison import OF_TAKE
 from app.shown.review import Review
 from app.state import Shelf, State
 from app.views.comparison import choices
+from app.views.filters import fused_by
 from app.views.formats import contents, offered
 from app.views.recording import clock_of
 from app.words import _, in_words
@@ -421,9 +422,10 @@ def _facts(review: Review) -> str:
         instants=len(review.time_s), lost=summary.missing if summary else "?"
     )
     zero = _("Zero of angles: {zero}").format(zero=_zero(header.setup.zero))
+    fused = _("Fused by: {filter}").format(filter=fused_by(review.setup))
     return (
         f"**{review.take.path.stem}** · {header.subject} · {start:%Y-%m-%d %H:%M:%S}\n\n"
-        f"{clock_of(review.duration_s)} · {counts}\n\n{zero}"
+        f"{clock_of(review.duration_s)} · {counts}\n\n{fused}\n\n{zero}"
     )
 
 

@@ -154,6 +154,14 @@ def about_name(about: str) -> str:
     return " ".join(filter(None, [part, between, turns.get(turn, turn)]))
 
 
+def row_name(about: str) -> str:
+    """What a row of measures is of; elbow and forearm have no sensor before them to count from."""
+    name = about_name(about)
+    if about in ("elbow_flexion", "forearm_pronation"):
+        return _("{angle}, from where it began").format(angle=name)
+    return name
+
+
 def figure(measure: Measure | None) -> str:
     """Value and uncertainty with its grade, or why there is none."""
     if measure is None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.report.names import (
-    about_name,
     figure,
     grade_word,
     group_note,
     group_title,
     kind_name,
+    row_name,
     unit_sign,
     verdict_words,
 )
@@ -60,7 +60,7 @@ def _table(
     rows, marks = [], []
     for row, ratio in zip(group.rows, ratios, strict=True):
         changed = _changed(row, known)
-        cells = [about_name(row.about) or "–", *_cells(row, kinds)]
+        cells = [row_name(row.about) or "–", *_cells(row, kinds)]
         cells += [_normal(row)] if normal else []
         cells += [changed.words] if compared else []
         cells += [ratio] if any(ratios) else []

@@ -6,7 +6,7 @@ import html
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from app.report.names import about_name, grade_word, why_words
+from app.report.names import about_name, grade_word, row_name, why_words
 from app.report.tables import Table, is_short, tables_of
 from app.shown.review import Review
 from app.state import State
@@ -99,12 +99,16 @@ def short_html(review: Review) -> str:
         other = _("Another part counts now: measure again.")
         told.append(f'<div style="color:{AMBER}">{html.escape(other)}</div>')
     sides = {(ratio.kind, ratio.about): ratio for ratio in measured.sides}
-    rows = [
-        _line(row, known, sides)
+    shown = [
+        row
         for group in grouped(measured.measures)
         if group.name in ("range", "scores", "opposition")
         for row in group.rows
     ]
+    if any(map(is_short, shown)):
+        short = _("short of usual, or not asked for")
+        told.append(f'<div style="color:{AMBER}">■ {html.escape(short)}</div>')
+    rows = [_line(row, known, sides) for row in shown]
     told.append(f'<table style="{_TABLE}">{"".join(rows)}</table>')
     return f'<div style="padding:0 .75em;font-size:.8rem;line-height:1.35">{"".join(told)}</div>'
 
@@ -130,7 +134,7 @@ def _line(
         sign = "▲" if any(c.verdict == "more" for c in beyond) else "▼"
     style = f"color:{colour}" if colour else ""
     return (
-        f'<tr style="{style}"><td style="{_CELL}">{html.escape(about_name(row.about))}</td>'
+        f'<tr style="{style}"><td style="{_CELL}">{html.escape(row_name(row.about))}</td>'
         f'<td style="{_CELL};white-space:nowrap">{html.escape(said)}</td>'
         f'<td style="color:{GREEN}">{sign}</td>{_of_other(row, sides)}</tr>'
     )
@@ -159,10 +163,10 @@ def _brief(row: Row) -> str:
         elif kind == "kapandji":
             out.append(f"Kapandji {_figure(measure)}")
         else:
-            name = {"tam": "TAM ", "strickland": "Str. "}.get(kind, "")
+            name = {"tam": "TAM ", "strickland": "Strickland "}.get(kind, "")
             unit = {"deg": "°", "%": " %"}.get(measure.unit, "")
             out.append(" ".join(filter(None, [f"{name}{_figure(measure)}{unit}"])))
-            if kind == "tam":
+            if kind in ("tam", "strickland"):
                 out[-1] += f" {grade_word(measure.grade)}"
     return ", ".join(dict.fromkeys(out))  # one reason for all is said once
 

@@ -20,6 +20,7 @@ _ROUNDS = 2  # tip and plane again from what was found to be strokes
 _LEAST_S, _LEAST_M = 0.3, 0.015  # of writing: less is none
 _MOST_SD_M = 0.0015  # of the height while it writes: more is no plane
 _BROAD, _BROAD_M = 3.0, 0.0008  # what is written spreads so across: in height's SDs, and at all
+_LINE_SHARE = 0.5  # of the time a pen is held, at most, goes into a line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,12 +111,15 @@ def _written(hand: PenHand) -> Writing | None:
 
 def _is_writing(writing: Writing) -> bool:
     """A pen on a desk, not a pinch that happens to move level for a while, or to and fro: a line
-    lies in any plane."""
+    lies in any plane. Whoever draws one holds the pen before and after."""
     across_m = float(np.sqrt(np.linalg.eigvalsh(np.cov(writing.flat[writing.down].T))[0]))
     return (
         writing.length_m > _LEAST_M
         and writing.height_sd_m < _MOST_SD_M
-        and across_m > max(_BROAD_M, _BROAD * writing.height_sd_m)
+        and (
+            across_m > max(_BROAD_M, _BROAD * writing.height_sd_m)
+            or float(writing.down.mean()) < _LINE_SHARE
+        )
     )
 
 
