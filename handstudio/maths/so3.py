@@ -92,11 +92,13 @@ def angle_between(p: Float[Array, "*#b 4"], q: Float[Array, "*#b 4"]) -> Float[A
 
 def to_matrix(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3 3"]:
     """Rotation matrices: columns are the axes of b written in a."""
+    # the products of `rotate` of each axis, in its order, so that both give the same digits
     w, x, y, z = np.moveaxis(q, -1, 0)
+    x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
     rows = [
-        *(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-        *(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-        *(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        *(1.0 - y * y2 - z * z2, y * x2 - w * z2, w * y2 + z * x2),
+        *(w * z2 + x * y2, 1.0 - z * z2 - x * x2, z * y2 - w * x2),
+        *(x * z2 - w * y2, w * x2 + y * z2, 1.0 - x * x2 - y * y2),
     ]
     return np.stack(rows, axis=-1).reshape(*q.shape[:-1], 3, 3)
 

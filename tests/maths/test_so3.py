@@ -83,6 +83,12 @@ def test_turning_keeps_lengths_angles_and_handedness(q, u, v):
 # --- the same rotations as scipy's ------------------------------------------------------------
 
 
+@given(rotations())
+def test_a_matrix_has_the_turned_axes_for_columns_to_the_last_bit(q):
+    turned = [so3.rotate(q, axis) for axis in np.eye(3)]
+    np.testing.assert_array_equal(so3.to_matrix(q), np.stack(turned, axis=-1))
+
+
 @given(rotations(), rotations(), vectors)
 def test_scipy_composes_turns_and_inverts_the_same(p, q, v):
     same(so3.multiply(p, q), of_scipy(to_scipy(p) * to_scipy(q)))
