@@ -128,7 +128,7 @@ def test_on_a_narrow_page_the_plots_start_put_away(
     start_studio: Start, visit: Callable[..., Page]
 ) -> None:
     studio = start_studio("--virtual")
-    wide, narrow = visit(studio), visit(studio, 1024, 768)
+    wide, narrow = visit(studio, 1440, 900), visit(studio, 1024, 768)
     expect(wide.get_by_text("MCP flexion")).to_be_visible()
     expect(narrow.get_by_text("Connected")).to_be_visible()
     narrow.wait_for_timeout(1500)
