@@ -38,7 +38,7 @@ from handstudio.recording.take_track import (
     track_path,
 )
 from handstudio.setup import Setup
-from handstudio.terminal import AGAIN_S, BAD, attitudes, best_sensor, filter_of, in_time
+from handstudio.terminal import AGAIN_S, attitudes, best_sensor, filter_of, in_time, tells
 from handstudio.trackers import late_root
 from handstudio.trackers.late_align import align
 from handstudio.trackers.late_root import Felt
@@ -296,9 +296,8 @@ def _felt(take: Take, setup: Setup, motion: Motion, k: int) -> Felt:
     for run in take.runs():
         sound = run if setup.sensors is None else corrected(run, setup.sensors, setup.layout.names)
         acc.append(sound.acc[:, k])
-    known = (motion.doubt[:, k] & BAD) == 0
     time_us, q = np.array(motion.time_us), in_time(setup, motion.q_world_sensor[:, k])
-    return Felt(time_us, q, np.concatenate(acc), known)
+    return Felt(time_us, q, np.concatenate(acc), tells(motion, k))
 
 
 def _place(take: Take, setup: Setup, motion: Motion, track: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Bool
 
 from handstudio.arrays import Array
 from handstudio.errors import CalibrationError
@@ -16,15 +17,11 @@ from handstudio.trackers.late_align import Alignment, align
 from handstudio.trackers.late_root import RootFilter
 from handstudio.trackers.track import Track
 
-FIXED_RAD = 0.1
-"""A terminal whose attitude differs by more is not on that sensor."""
-
 AGAIN_S = (-0.1, 0.1)
 """A track that is aligned already may be shifted by so much by another setup."""
 
-BAD = np.uint8(Doubt.UNPLACED | Doubt.SILENT)
-"""Attitudes with such doubts tell nothing."""
-
+_FIXED_RAD = 0.1  # a terminal whose attitude differs by more is not on that sensor
+_BAD = np.uint8(Doubt.UNPLACED | Doubt.SILENT)
 _ALIKE_RAD = 0.005
 _LEVER_SD_M = 0.03
 
@@ -44,7 +41,7 @@ def best_sensor(
     first = [] if wanted is None else [wanted]
     refused: CalibrationError | None = None
     for name in [*first, *(n for n in names if n not in first)]:
-        if wanted in found and found[wanted].residual_rad <= FIXED_RAD:
+        if wanted in found and found[wanted].residual_rad <= _FIXED_RAD:
             break
         try:
             found[name] = align(*attitudes(setup, motion, names.index(name)), track, search_s)
@@ -63,7 +60,7 @@ def best_sensor(
         key=lambda name: _depth(setup, name),
     )
     chosen = wanted or best
-    if chosen not in found or found[chosen].residual_rad > FIXED_RAD:
+    if chosen not in found or found[chosen].residual_rad > _FIXED_RAD:
         raise CalibrationError(
             "The terminal {terminal} does not stay with {sensor}; of all it stays best with "
             "{best}, within {degrees:.1f} deg.",
@@ -89,9 +86,15 @@ def filter_of(found: Alignment, lever: tuple[float, float, float] | None) -> Roo
     return late_root.filter_for(found, like)
 
 
+def tells(motion: Motion, k: int) -> Bool[Array, " n"]:
+    """Whether the attitude of one sensor tells something, instant by instant."""
+    told: Array = (motion.doubt[:, k] & _BAD) == 0
+    return told
+
+
 def attitudes(setup: Setup, motion: Motion, k: int) -> tuple[Array, Array]:
     """Times [us] and attitudes of one sensor, as far as they tell something."""
-    placed = (motion.doubt[:, k] & BAD) == 0
+    placed = tells(motion, k)
     return np.array(motion.time_us[placed]), in_time(setup, motion.q_world_sensor[:, k])[placed]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import viser
 
@@ -58,7 +60,18 @@ class SkinNodes:
         """
         if skeleton is not self._skeleton or self._skin is None:
             self._skeleton, self._mesh = skeleton, skinned(skeleton)
-            self._skin = self._put_on(self._mesh, colour, opacity)
+            mesh = self._mesh
+            self._skin = self._carried(
+                self._skin,
+                self._name,
+                mesh.vertices,
+                mesh.faces,
+                weights=mesh.dense_weights(),
+                bound=mesh.bound,
+                color=colour,
+                opacity=opacity,
+                cast_shadow=self._shadow,
+            )
             self._outgrown = set(self._patches)
         for name, value in (("color", colour), ("opacity", opacity)):
             if getattr(self._skin.node, name) != value:
@@ -81,53 +94,52 @@ class SkinNodes:
         if self._skin is not None:
             self._skin.hide()
 
-    def _put_on(
-        self, mesh: SkinnedMesh, colour: tuple[int, int, int], opacity: float | None
-    ) -> _Carried:
-        weights = mesh.dense_weights()
-        if self._skin is not None:
-            self._skin.reshape(self._server, mesh.vertices, mesh.faces, weights, mesh.bound)
-            return self._skin
-        node = self._server.scene.add_mesh_skinned(
-            self._name,
-            mesh.vertices,
-            mesh.faces,
-            bone_wxyzs=mesh.bound.q_world_segment,
-            bone_positions=mesh.bound.t_world_joint,
-            skin_weights=weights,
-            color=colour,
-            opacity=opacity,
-            cast_shadow=self._shadow,
-            receive_shadow=False,
-        )
-        return _Carried(node)
-
     def _patch(self, mesh: SkinnedMesh, segment: int, dead: bool) -> _Carried:
         key = segment, dead
         if key in self._patches and key not in self._outgrown:
             return self._patches[key]
         part, faces = mesh.part(segment)
-        weights = mesh.dense_weights()[part]
-        lifted = mesh.vertices[part] + _ABOVE_M * mesh.normals()[part]
-        if key in self._patches:
-            self._patches[key].reshape(self._server, lifted, faces, weights, mesh.bound)
-            self._outgrown.remove(key)
-            return self._patches[key]
-        node = self._server.scene.add_mesh_skinned(
+        self._patches[key] = self._carried(
+            self._patches.get(key),
             f"{self._name}/{SEGMENTS[segment]}{'-dead' if dead else ''}",
-            lifted,
+            mesh.vertices[part] + _ABOVE_M * mesh.normals()[part],
             faces,
-            bone_wxyzs=mesh.bound.q_world_segment,
-            bone_positions=mesh.bound.t_world_joint,
-            skin_weights=weights,
+            weights=mesh.dense_weights()[part],
+            bound=mesh.bound,
             color=colours.DEAD if dead else colours.DOUBT,
             wireframe=not dead,
             opacity=None if dead else _HATCHING,
             cast_shadow=False,
-            receive_shadow=False,
         )
-        self._patches[key] = _Carried(node)
+        self._outgrown.discard(key)
         return self._patches[key]
+
+    def _carried(
+        self,
+        kept: _Carried | None,
+        name: str,
+        vertices: Array,
+        faces: Array,
+        *,
+        weights: Array,
+        bound: Pose,
+        **looks: Any,
+    ) -> _Carried:
+        """A skinned mesh: one that is there takes this shape, else it is made."""
+        if kept is not None:
+            kept.reshape(self._server, vertices, faces, weights, bound)
+            return kept
+        node = self._server.scene.add_mesh_skinned(
+            name,
+            vertices,
+            faces,
+            bone_wxyzs=bound.q_world_segment,
+            bone_positions=bound.t_world_joint,
+            skin_weights=weights,
+            receive_shadow=False,
+            **looks,
+        )
+        return _Carried(node)
 
 
 class _Carried:

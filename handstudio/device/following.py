@@ -23,7 +23,7 @@ from handstudio.recorded_track import LeastDelayed, on_axis, rising
 from handstudio.recording.tracker_message import Poses, TrackerFacts, joined
 from handstudio.rooted import BELIEVED_SD_M, TOLD_S, elbow_of
 from handstudio.setup import Setup
-from handstudio.terminal import AGAIN_S, BAD, best_sensor, filter_of
+from handstudio.terminal import AGAIN_S, best_sensor, filter_of, tells
 from handstudio.trackers import late_root
 from handstudio.trackers.clocks import FIRST, TrackerClock, clock_of
 from handstudio.trackers.late_align import Alignment
@@ -246,7 +246,7 @@ class Following:
         assert state is not None
         k, part = setup.layout.names.index(self.newest.sensor), parts[-1]
         motion = part.motion if felt else part.motion[:0]
-        known = (motion.doubt[:, k] & BAD) == 0
+        known = tells(motion, k)
         acc = part.acc[: len(motion), k]
         told = Felt(motion.time_us, motion.q_world_sensor[:, k], acc, known)
         placed, state = late_root.run(filter, state, told, _nothing() if track is None else track)
